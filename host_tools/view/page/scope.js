@@ -13,8 +13,8 @@ const LEVELLED = ["force", "velocity"];
 
 async function uplot() {
   try {
-    const [library] = await Promise.all([import("/uplot.js"), loadStyle("/uplot.css")]);
-    return library.default;
+    const [drawing] = await Promise.all([import("/uplot.js"), loadStyle("/uplot.css")]);
+    return drawing.default;
   } catch {
     return null;
   }
@@ -42,8 +42,8 @@ export class Scope {
     boxes.capture.onclick = () => this.capture();
     boxes.trigger.onchange = () => { boxes.level.parentElement.hidden = !LEVELLED.includes(boxes.trigger.value); };
     boxes.signal.onchange = () => this.rebuild();
-    uplot().then((library) => {
-      this.library = library;
+    uplot().then((UPlot) => {
+      this.UPlot = UPlot;
       this.ready = true;
       this.rebuild();
     });
@@ -99,7 +99,7 @@ export class Scope {
     for (const chart of this.charts) chart.destroy();
     this.charts = [];
     this.boxes.plots.replaceChildren();
-    if (!this.ready || !this.library) return;
+    if (!this.ready || !this.UPlot) return;
     const names = this.kind === "spectrum" ? ["spectrum"] : Object.keys(SIGNALS);
     const box = this.boxes.plots.getBoundingClientRect();
     const columns = names.length === 1 ? 1 : box.width > 700 ? 4 : 2;
@@ -117,7 +117,7 @@ export class Scope {
     const unit = SIGNALS[name]?.unit ?? "";
     const axis = { stroke: () => colour("text-quiet"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const across = { rolling: "s", capture: "ms", spectrum: "Hz" }[this.kind];
-    return new this.library({
+    return new this.UPlot({
       width, height, legend: { show: false }, cursor: { show: this.kind !== "rolling", drag: { x: true, y: false } },
       title: name === "spectrum" ? undefined : `${name} (${shownUnit(unit)})`,
       scales: { x: { time: false }, y: { range: (_, low, high) => withRoom(low, high, SIGNALS[name]?.least ?? 0) } },
@@ -130,7 +130,7 @@ export class Scope {
   /** Thirty times a second at most; `rows` are those of the chosen axis. */
   draw(rows, now) {
     if (!this.ready || !rows) return;
-    if (!this.library) return this.asText(rows);
+    if (!this.UPlot) return this.asText(rows);
     const interval = this.kind === "spectrum" ? 250 : 50;
     if (now - (this.drawn ?? 0) < interval) return;
     this.drawn = now;

@@ -12,16 +12,16 @@
 #include <utility>
 
 #include "board/odrive_v3/description.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
 #include "firmware/application.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/virtual_board/cortex_m/instruction.hpp"
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 #include "host_tools/virtual_board/run/board_link.hpp"
-#include "host_tools/virtual_board/run/flash_accelerator.hpp"
 #include "host_tools/virtual_board/run/full_bus.hpp"
 #include "host_tools/virtual_board/run/inline_frames.hpp"
+#include "host_tools/virtual_board/run/memory_waits.hpp"
 #include "host_tools/virtual_board/run/parameter_sectors.hpp"
+#include "host_tools/virtual_board/run/tick_recorder.hpp"
 
 namespace kmax::virtual_board {
 namespace {
@@ -84,113 +84,6 @@ std::string step_of(const std::vector<std::string>& frames) {
   return other_step;
 }
 
-std::uint16_t half_word_at(Bus& bus, std::uint32_t address) {
-  const auto bytes = bus.memory(address, 2);
-  return bytes.empty() ? std::uint16_t{0} : static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
-}
-
-/// A load or store of the tick that its fetches may have to wait for, or that waits itself.
-struct DataAccess {
-  std::size_t at;  ///< how many instructions had begun, with all of its block
-  std::uint32_t address;
-};
-
-struct Tick {
-  std::uint32_t object = UINT32_MAX;  ///< where the axis lies in the image's memory
-  std::size_t axis = 0;
-  std::vector<std::uint32_t> addresses;
-  std::vector<DataAccess> accesses;  ///< to flash and to SRAM1
-  std::uint64_t register_waits = 0;
-};
-
-bool is_sram1(std::uint32_t address) {
-  return memory_map::sram1.contains(address) || memory_map::sram1_at_zero.contains(address);
-}
-
-/// The sequence of instructions of every run of the conversions' interrupt, without what interrupts it.
-class Recorder {
- public:
-  Recorder(const ElfImage& image, VirtualBoard& board)
-      : board_(board),
-        handler_(image.required_symbol("ISR_adc").address),
-        axis_tick_(
-            image
-                .required_symbol("_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputERKNS1_"
-                                 "7CommandEm")
-                .address) {
-    board.processor().on_block([this](std::uint32_t address, std::uint32_t size) { note(address, size); });
-    board.processor().on_data_access([this](std::uint32_t address) { note_access(address); });
-  }
-
-  void start() {
-    recording_ = true;
-    main_loop_ = 0;
-  }
-  /// Instructions outside all interrupts.
-  std::uint64_t main_loop() const { return main_loop_; }
-  std::vector<Tick> take() {
-    // The axes are an array: axis 0 lies lowest.
-    std::uint32_t lowest = UINT32_MAX;
-    for (const Tick& tick : ticks_) lowest = std::min(lowest, tick.object);
-    for (Tick& tick : ticks_) tick.axis = tick.object == lowest ? 0 : 1;
-    open_ = in_tick_ = false;
-    return std::exchange(ticks_, {});
-  }
-
- private:
-  void note(std::uint32_t address, std::uint32_t size) {
-    if (!recording_) return;
-    const auto& exceptions = board_.core().exceptions;
-    constexpr unsigned conversions = 16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::adc);
-    if (address == handler_) {
-      ticks_.emplace_back();
-      waits_before_ = board_.bus().register_waits();
-      open_ = true;
-    }
-    // The first block behind the tick closes it.
-    in_tick_ = false;
-    if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
-    open_ = open_ && exceptions.active(conversions);
-    if (ticks_.empty()) return;
-    if (exceptions.execution_level({}) == ExceptionTable::base_level)
-      main_loop_ += instructions_in(address, size);
-    if (!exceptions.active(conversions)) return;
-    if (exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti2)) ||
-        exceptions.active(16 + static_cast<unsigned>(drivers::stm32f4::Interrupt::exti4)))
-      return;
-    in_tick_ = true;
-    Tick& tick = ticks_.back();
-    if (address == axis_tick_) tick.object = board_.processor().core_register(0);
-    each_instruction(address, size, [&tick](std::uint32_t at) { tick.addresses.push_back(at); });
-  }
-
-  void note_access(std::uint32_t address) {
-    if (!in_tick_) return;
-    if (memory_map::flash.contains(address) || is_sram1(address))
-      ticks_.back().accesses.push_back({ticks_.back().addresses.size(), address});
-  }
-
-  template <typename Use>
-  void each_instruction(std::uint32_t address, std::uint32_t size, Use use) {
-    for (std::uint32_t at = address; at < address + size;
-         at += is_wide(half_word_at(board_.bus(), at)) ? 4 : 2)
-      use(at);
-  }
-  std::uint64_t instructions_in(std::uint32_t address, std::uint32_t size) {
-    std::uint64_t& known = lengths_[address];
-    if (known == 0) each_instruction(address, size, [&known](std::uint32_t) { ++known; });
-    return known;
-  }
-
-  VirtualBoard& board_;
-  std::uint32_t handler_, axis_tick_;
-  bool recording_ = false, open_ = false;
-  bool in_tick_ = false;  ///< the present block is the tick's
-  std::uint64_t waits_before_ = 0, main_loop_ = 0;
-  std::map<std::uint32_t, std::uint64_t> lengths_;  ///< of the main loop's blocks, instructions
-  std::vector<Tick> ticks_;
-};
-
 /// Entry, exit and the FP frame, PM0214; not part of what instructions cost.
 constexpr std::uint32_t exception_cycles = 12 + 12 + 2 * 17;
 
@@ -208,7 +101,7 @@ struct StepInTick {
 constexpr double measured = 0.3;  // s
 
 /// Both axes stay armed.
-TrafficReport under_traffic(VirtualBoard& board, BoardLink& link, Recorder& recorder, double round_s) {
+TrafficReport under_traffic(VirtualBoard& board, BoardLink& link, TickRecorder& recorder, double round_s) {
   FullBus bus(board);
   recorder.start();
   const std::uint64_t answers = bus.answers(), telemetry = bus.telemetry();
@@ -268,7 +161,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   SceneWorld world(scene);
   VirtualBoard board(image, &world, config);
   store_parameters(board, simulated_board::assignments_of(scene));
-  Recorder recorder(image, board);
+  TickRecorder recorder(image, board);
   board.run_for(0.3);
   BoardLink link(board);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) link.arm(axis);
@@ -276,11 +169,11 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   // The approach, the contact and some of the hold.
   board.run_for(measured);
   require_armed(board);
-  std::vector<Tick> ticks = recorder.take();
+  std::vector<RecordedTick> ticks = recorder.take();
   const std::uint64_t main_loop = recorder.main_loop();
   if (!ticks.empty()) ticks.pop_back();  // not over
   std::array<std::uint64_t, firmware::axis_count> ticks_of{};
-  for (const Tick& tick : ticks) ++ticks_of.at(tick.axis);
+  for (const RecordedTick& tick : ticks) ++ticks_of.at(tick.axis);
   require_all_ticks(ticks_of, measured);
 
   constexpr const board::BoardDescription& of_board = board::odrive_v3::description;
@@ -290,7 +183,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   require_armed(board);
 
   std::set<std::uint32_t> unique;
-  for (const Tick& tick : ticks) unique.insert(tick.addresses.begin(), tick.addresses.end());
+  for (const RecordedTick& tick : ticks) unique.insert(tick.addresses.begin(), tick.addresses.end());
   const auto frames = inline_frames(elf_path, {unique.begin(), unique.end()});
   struct Place {
     std::string step;
@@ -298,8 +191,9 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   };
   std::map<std::uint32_t, Place> places;
   for (const std::uint32_t address : unique) {
-    places[address] = {step_of(frames.at(address)), decode(half_word_at(board.bus(), address),
-                                                           half_word_at(board.bus(), address + 2), address)};
+    const std::uint32_t code = board.bus().load(address).value_or(0);
+    places[address] = {step_of(frames.at(address)), decode(static_cast<std::uint16_t>(code),
+                                                           static_cast<std::uint16_t>(code >> 16), address)};
   }
 
   std::map<std::string, StepSum> sums;
@@ -310,10 +204,10 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   std::array<Waits, 2> waits{};
   std::uint64_t flash_reads = 0;
   std::uint32_t estimate_worst = 0, motor_worst = 0, without_io_worst = 0;
-  for (const Tick& tick : ticks) {
+  for (const RecordedTick& tick : ticks) {
     std::map<std::string, StepInTick> in_tick;
-    FlashAccelerator flash, keeps_all(FlashAccelerator::Kept::all);
-    std::uint64_t flash_waits = 0, waits_if_all_kept = 0, sram_waits = 0, cycles_so_far = 0;
+    MemoryWaits memory;
+    std::uint64_t cycles_so_far = 0;
     std::size_t next_access = 0;
     const Place* previous = nullptr;
     for (std::size_t i = 0; i < tick.addresses.size(); ++i) {
@@ -329,28 +223,12 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
           (in_line ? cycles_saved_behind(previous->instruction, place.instruction) : 0U);
       previous = &place;
       step.cycles += its_cycles;
-      const std::uint64_t waits_before = flash_waits;
+      const std::uint64_t waits_before = memory.for_flash();
       const std::uint32_t fetched = tick.addresses[i];
-      const auto in_flash = [&](auto wait) {
-        for (const auto& [model, total] : {std::pair{&flash, &flash_waits}, {&keeps_all, &waits_if_all_kept}})
-          *total += wait(*model, cycles_so_far + *total);
-      };
-      if (memory_map::flash.contains(fetched)) {
-        ++flash_reads;
-        in_flash([&](FlashAccelerator& model, std::uint64_t now) {
-          return model.fetch(fetched, place.instruction.bytes, now);
-        });
-      }
-      for (; next_access < tick.accesses.size() && tick.accesses[next_access].at == i + 1; ++next_access) {
-        const std::uint32_t address = tick.accesses[next_access].address;
-        if (memory_map::flash.contains(address)) {
-          ++flash_reads;
-          in_flash([&](FlashAccelerator& model, std::uint64_t now) { return model.load(address, now); });
-        } else if (is_sram1(fetched)) {
-          ++sram_waits;
-        }
-      }
-      step.waits += flash_waits - waits_before;
+      memory.fetch(fetched, place.instruction.bytes, cycles_so_far);
+      for (; next_access < tick.accesses.size() && tick.accesses[next_access].at == i + 1; ++next_access)
+        memory.access(tick.accesses[next_access].address, fetched, cycles_so_far);
+      step.waits += memory.for_flash() - waits_before;
       cycles_so_far += its_cycles;
     }
     std::uint32_t cycles_of_tick = exception_cycles;
@@ -381,11 +259,12 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
           std::max(without_io_worst, static_cast<std::uint32_t>(tick.addresses.size()) -
                                          instructions_of({"encoder, index", "current sampling", "PWM"}));
     }
-    waits[axis].flash += flash_waits;
-    waits[axis].flash_if_all_kept += waits_if_all_kept;
-    waits[axis].sram += sram_waits;
+    flash_reads += memory.flash_reads();
+    waits[axis].flash += memory.for_flash();
+    waits[axis].flash_if_all_kept += memory.for_flash_if_all_kept();
+    waits[axis].sram += memory.for_sram();
     waits[axis].buses += tick.register_waits;
-    const std::uint64_t all_waits = flash_waits + sram_waits + tick.register_waits;
+    const std::uint64_t all_waits = memory.for_flash() + memory.for_sram() + tick.register_waits;
     waits[axis].worst = std::max(waits[axis].worst, cycles_of_tick + all_waits);
     StepSum& total = totals[axis];
     ++total.ticks;

@@ -32,13 +32,9 @@ struct BudgetLine {
   bool kept() const { return value <= bound; }
 };
 
-/// Of the whole ticks of both axes, with the waits for memories and buses. Left out is the vector, which the
-/// core reads from flash while it stacks.
-/// - flash, by instructions and by data: FlashAccelerator, which begins each tick empty because what ran
-///   before it was something else
-/// - SRAM1 while code is fetched from it: a cycle for each load and store of data there. An upper bound: the
-///   core fetches in advance, so that not each of them meets a fetch
-/// - registers: Bus::register_waits
+/// Of the whole ticks of both axes, with MemoryWaits, which begin each tick with empty caches because what
+/// ran before it was something else, and Bus::register_waits. Left out is the vector, which the core reads
+/// from flash while it stacks.
 struct WaitReport {
   double mean = 0.0, worst = 0.0;               ///< % of the core's time; worst: both worst ticks together
   double flash = 0.0, sram = 0.0, buses = 0.0;  ///< of the mean
