@@ -1,6 +1,7 @@
 // What stops a run, in words that lead to the instruction; and the same as faults of the chip, when asked
 // for.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "drivers/cortex_m/registers.hpp"
@@ -165,12 +166,17 @@ TEST(ProcessorFault, StopsAtUndefinedInstructions) {
 }
 
 TEST(ProcessorFault, StopsWhenTheFrameDoesNotFitIntoMemory) {
-  ProgramOnCore board({0xBF30, 0xBE01});
-  board.core.exceptions.set_enabled(tim2, true);
-  board.handler(tim2, {0x4770});
-  board.set(13, 0x2000'0010);
-  board.core.exceptions.pend(tim2);
-  expect_fault(board, {"stack pointer 0x20000010", "outside RAM"});
+  // The latter is SRAM where it is fetched from, to which nothing is stored.
+  for (const std::uint32_t stack_pointer : {0x2000'0010U, 0x0000'1000U}) {
+    ProgramOnCore board({0xBF30, 0xBE01});
+    board.bus.show_sram_at_zero(true);
+    board.core.exceptions.set_enabled(tim2, true);
+    board.handler(tim2, {0x4770});
+    board.set(13, stack_pointer);
+    board.core.exceptions.pend(tim2);
+    const std::string place = fmt::format("stack pointer 0x{:08X}", stack_pointer);
+    expect_fault(board, {place.c_str(), "outside RAM"});
+  }
 }
 
 TEST(ProcessorFault, StopsAtABrokenVectorOrReturn) {
