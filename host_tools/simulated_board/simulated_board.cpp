@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+template class kmax::board::NativeBoard<kmax::simulated_board::SimulatedDevice>;
+
 namespace kmax::simulated_board {
 
 simulation::Scene open_scene(const std::string& name_or_path,

@@ -8,6 +8,9 @@
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_device.hpp"
 
+/// Compiled once, as fast as can be, however a program is compiled that runs it.
+extern template class kmax::board::NativeBoard<kmax::simulated_board::SimulatedDevice>;
+
 namespace kmax::simulated_board {
 
 /// The firmware on x86 with a scene's device: what `sim`, `kmax serve` and `kmax simulate` run.
