@@ -3,6 +3,7 @@
 #include "host_tools/selftest/selftest.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
 #include "tests/host_tools/thrown_message.hpp"
+#include "tests/shared_beginning.hpp"
 
 namespace kmax::selftest::selftest_ended_test {
 
@@ -14,26 +15,26 @@ bool force_is_possible(TestedAxis& tested) {
 }
 
 TEST(SelfTestLeaves, WhereverItIsInterruptedTheAxisIsDisarmedAndTheParametersAreAsBefore) {
-  for (int at = 1; at < 40; at += 3) {
-    TestedAxis tested("gimbal_b");
-    const auto before = tested.settings();
-    int told_times = 0;
-    SelfTestSettings settings;
-    settings.link_exchanges = 10;
-    try {
-      run_selftest(*tested.device, settings, [&](const std::string&) {
-        if (++told_times == at) throw std::runtime_error("interrupted");
-      });
-      EXPECT_GT(at, told_times);
-    } catch (const SelfTestEnded& error) {
-      const std::string text = error.what();
-      EXPECT_TRUE(text == "interrupted; the axis is disarmed; every parameter is as it was" ||
-                  text == "interrupted; nothing was changed in the device")
-          << text;
-    }
-    EXPECT_TRUE(tested.disarmed()) << at;
-    EXPECT_EQ(tested.settings(), before) << at;
+  SharedBeginning beginning;
+  TestedAxis tested("gimbal_b");
+  const auto before = tested.settings();
+  int steps = 0;
+  SelfTestSettings settings;
+  settings.link_exchanges = 10;
+  try {
+    run_selftest(*tested.device, settings, [&](const std::string&) {
+      if (++steps % 3 == 1 && beginning.fork()) throw std::runtime_error("interrupted");
+    });
+    EXPECT_FALSE(beginning.in_copy()) << steps;
+    EXPECT_GT(beginning.copies(), 8U);
+  } catch (const SelfTestEnded& error) {
+    const std::string text = error.what();
+    EXPECT_TRUE(text == "interrupted; the axis is disarmed; every parameter is as it was" ||
+                text == "interrupted; nothing was changed in the device")
+        << text;
   }
+  EXPECT_TRUE(tested.disarmed()) << steps;
+  EXPECT_EQ(tested.settings(), before) << steps;
 }
 
 TEST(SelfTestLeaves, WhatIsNoExceptionOfTheLibraryPassesThrough) {
