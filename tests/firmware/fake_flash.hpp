@@ -2,12 +2,12 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <random>
-#include <set>
-#include <utility>
 
 #include "firmware/parameters/parameter_store.hpp"
 
@@ -16,10 +16,31 @@ namespace kmax::firmware {
 /// Thrown in the middle of a program or an erase: the processor is gone.
 struct PowerCut {};
 
-class FakeFlash {
+/// Some of the words of two sectors, which are asked for at every read.
+class FlashWords {
  public:
   static constexpr std::size_t sector_count = 2;
   static constexpr std::size_t words_per_sector = 4096;
+  struct Place {
+    std::size_t sector, word;
+  };
+
+  FlashWords() = default;
+  FlashWords(std::initializer_list<Place> all) {
+    for (const Place& place : all) insert(place);
+  }
+  void insert(Place place) { sectors_.at(place.sector).set(place.word); }
+  void clear() { *this = {}; }
+  bool contains(Place place) const { return sectors_.at(place.sector).test(place.word); }
+
+ private:
+  std::array<std::bitset<words_per_sector>, sector_count> sectors_;
+};
+
+class FakeFlash {
+ public:
+  static constexpr std::size_t sector_count = FlashWords::sector_count;
+  static constexpr std::size_t words_per_sector = FlashWords::words_per_sector;
 
   FakeFlash() {
     for (auto& sector : words) sector.fill(0xFFFF'FFFFU);
@@ -66,9 +87,9 @@ class FakeFlash {
   void restore_power() { operations_until_cut = -1; }
 
   std::array<std::array<std::uint32_t, words_per_sector>, sector_count> words;
-  std::set<std::pair<std::size_t, std::size_t>> broken;  ///< words of which `broken_bits` stay set
+  FlashWords broken;  ///< words of which `broken_bits` stay set
   std::uint32_t broken_bits = 0xFFFF'FFFFU;
-  std::set<std::pair<std::size_t, std::size_t>> refused;  ///< words whose programming is said to have failed
+  FlashWords refused;  ///< words whose programming is said to have failed
   bool erase_works = true;
   std::function<void(std::size_t)> before_erase;
   std::function<void(std::size_t, std::size_t)> after_program;

@@ -220,8 +220,8 @@ TEST(ModbusServer, All256FunctionCodes) {
   for (unsigned function = 0; function < 256; ++function) {
     const bool served = function == 3 || function == 4 || function == 6 || function == 16 || function == 22 ||
                         function == 8 || function == 23 || function == 43 || function == 65;
+    Fixture f;
     for (std::size_t size = 1; size <= pdu_size_max; ++size) {
-      Fixture f;
       const int exception = f.exception_of(Bytes{low(function)} + Bytes(size - 1, 0));
       // Zeros after function 43 are an MEI type that is not served.
       const bool unknown = !served || (function == 43 && size > 1);

@@ -100,16 +100,18 @@ RC_GTEST_PROP(TraceReaderProperty, GotAndLostAreWhatWasTraced, ()) {
   const double rate = *rc::gen::element(500.0, 1000.0, 4000.0, 20000.0);
   const auto interval = *rc::gen::element<std::uint16_t>(1, 1, 2, 3);
   Traced traced(rate, 0, interval);
-  const auto waits = *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 1500));
+  const double step = interval / rate;
+  // Of records: from none to some more than the ring holds.
+  const auto waits =
+      *rc::gen::container<std::vector<int>>(rc::gen::inRange<int>(0, firmware::trace_capacity * 5 / 4));
   std::vector<TraceSample> samples;
   for (std::size_t i = 0; i < waits.size() && i < 4; ++i) {
-    traced.device.link().wait(milliseconds(waits[i]));
+    traced.device.link().wait(std::chrono::microseconds(std::lround(waits[i] * step * 1e6)));
     traced.reader->read(samples);
   }
   traced.reader->stop();
   traced.reader->read(samples);
   RC_ASSERT(samples.size() + traced.reader->lost() == traced.records());
-  const double step = interval / rate;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     // On the grid of the trace's beginning, in order, never twice.
     const double steps = samples[i].time / step;

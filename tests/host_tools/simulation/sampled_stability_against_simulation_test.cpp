@@ -51,20 +51,22 @@ Fate fate_of(const Loop& loop, double stiffness, double samples_per_e_fold,
   CoupledHandle handle = handle_of(loop, delay);
   const int whole = static_cast<int>(std::floor(loop.delay / loop.period));
   const double late = loop.delay - whole * loop.period;
-  std::array<double, 10> under_way{};  // newest first
+  std::array<double, 16> under_way{};
+  std::size_t newest = 0;
+  const auto force_of = [&](int samples_ago) {
+    return under_way[(newest - static_cast<std::size_t>(samples_ago)) % under_way.size()];
+  };
   double last = handle.position();
   const auto sample = [&] {
     const double x = handle.position();
-    std::copy_backward(under_way.begin(), under_way.end() - 1, under_way.end());
-    under_way[0] = -stiffness * x - loop.wall_damping * (x - last) / loop.period;
+    under_way[++newest % under_way.size()] = -stiffness * x - loop.wall_damping * (x - last) / loop.period;
     last = x;
     if (delay == Delay::of_the_device) {
-      handle.advance(under_way[0], 0.0, loop.period);
+      handle.advance(force_of(0), 0.0, loop.period);
       return std::abs(x);
     }
-    const auto newest = static_cast<std::size_t>(whole);
-    if (late > 0.0) handle.advance(under_way[newest + 1], 0.0, late);
-    handle.advance(under_way[newest], 0.0, loop.period - late);
+    if (late > 0.0) handle.advance(force_of(whole + 1), 0.0, late);
+    handle.advance(force_of(whole), 0.0, loop.period - late);
     return std::abs(x);
   };
   const int block = std::max(30, static_cast<int>(samples_per_e_fold * 0.2));
