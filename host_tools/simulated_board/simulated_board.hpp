@@ -8,7 +8,7 @@
 #include "host_tools/simulated_board/scene_parameters.hpp"
 #include "host_tools/simulated_board/simulated_device.hpp"
 
-/// Compiled once, as fast as can be, however a program is compiled that runs it.
+/// Instantiated in simulated_board.cpp alone: a program compiled with -O0 would bring slow copies of it.
 extern template class kmax::board::NativeBoard<kmax::simulated_board::SimulatedDevice>;
 
 namespace kmax::simulated_board {

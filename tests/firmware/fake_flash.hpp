@@ -16,7 +16,7 @@ namespace kmax::firmware {
 /// Thrown in the middle of a program or an erase: the processor is gone.
 struct PowerCut {};
 
-/// Some of the words of two sectors, which are asked for at every read.
+/// A set of words of two sectors, a bit each, since every read looks one up.
 class FlashWords {
  public:
   static constexpr std::size_t sector_count = 2;

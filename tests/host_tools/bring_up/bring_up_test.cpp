@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
@@ -81,6 +82,8 @@ TEST(BringUp, NoStageBeforeItsTurn) {
   EXPECT_EQ(board.person.report.result(0, Stage::gate_drivers), nullptr);
 }
 
+constexpr double usual_source_resistance = 0.05;  // ohm
+
 /// A fault of the wiring, and where it must be found, with which words.
 struct Planted {
   const char* name;
@@ -90,7 +93,7 @@ struct Planted {
   std::function<void(StartedBoard&)> plant;   ///< when that stage begins
   std::optional<Settings> settings{};         ///< of the whole run; none: the usual ones
   bool breaks_parts = false;                  ///< of the board, before anybody could look
-  std::optional<double> source_resistance{};  ///< ohm; none: the usual one
+  std::optional<double> source_resistance{};  ///< ohm; none: usual_source_resistance
 };
 
 Settings with(void (*change)(Settings&)) {
@@ -200,65 +203,66 @@ TEST(BringUp, AnIndexThatIsWiredIsPassedByHand) {
 
 /// Each fault on its own copy of a board that came without one to the stage at which it is planted.
 void find_each(const simulation::Scene& scene, const Settings& settings, std::vector<Planted> faults) {
-  SharedBeginning beginning;
-  StartedBoard board(scene);
-  const auto before = board.board.settings();
-  std::optional<Planted> planted;
-  board.person.at_stage = [&](const std::string& asked) {
-    const auto at_this_stage = [&](const Planted& one) {
-      return asked.starts_with(fmt::format("Stage {}:", text_of(one.stage).name));
+  SharedBeginning::run([&](SharedBeginning& beginning) {
+    StartedBoard board(scene);
+    const auto before = board.board.settings();
+    std::optional<Planted> there;
+    board.person.at_stage = [&](const std::string& asked) {
+      const auto at_this_stage = [&](const Planted& one) {
+        return asked.starts_with(fmt::format("Stage {}:", text_of(one.stage).name));
+      };
+      for (const Planted& one : faults) {
+        if (there || !at_this_stage(one) || !beginning.fork(one.name)) continue;
+        there = one;
+        if (one.plant) one.plant(board);
+      }
+      std::erase_if(faults, at_this_stage);
+      if (!there && faults.empty()) throw bench::Interrupted("all have been planted");
     };
-    for (const Planted& one : faults) {
-      if (planted || !at_this_stage(one) || !beginning.fork()) continue;
-      planted = one;
-      if (one.plant) one.plant(board);
+    bool passed = true;
+    try {
+      passed = board.person.run(settings);
+    } catch (const bench::Interrupted&) {
+      if (there) throw;
     }
-    std::erase_if(faults, at_this_stage);
-    if (!planted && faults.empty()) throw bench::Interrupted("all have been planted");
-  };
-  bool passed = false;
-  try {
-    passed = board.person.run(settings);
-  } catch (const bench::Interrupted&) {
-    EXPECT_FALSE(planted) << planted->name;
-  }
-  if (!planted) {
-    EXPECT_TRUE(faults.empty()) << faults.front().name << " was not planted\n" << board.person.text();
-    return;
-  }
-  SCOPED_TRACE(planted->name);
-  EXPECT_FALSE(passed) << board.person.text();
-  EXPECT_EQ(board.person.report.next(0), planted->stage) << board.person.text();
-  EXPECT_TRUE(board.person.faulty_part() == planted->part || *planted->part == '\0')
-      << board.person.faulty_part() << "\n"
-      << board.person.text();
-  board.board.link->lose_every(0);
-  EXPECT_TRUE(board.board.disarmed());
-  if (planted->stage < Stage::calibration && std::string(planted->name) != "no brake resistor at AUX") {
-    EXPECT_EQ(board.board.settings(), before);
-  }
-  // It goes on there, and not before.
-  EXPECT_EQ(board.person.begun.back(), text_of(planted->stage).name);
+    if (!there) {
+      EXPECT_TRUE(passed) << board.person.text();
+      EXPECT_TRUE(faults.empty()) << faults.front().name << " was not planted";
+      return;
+    }
+    EXPECT_FALSE(passed) << board.person.text();
+    EXPECT_EQ(board.person.report.next(0), there->stage) << board.person.text();
+    EXPECT_TRUE(board.person.faulty_part() == there->part || *there->part == '\0')
+        << board.person.faulty_part() << "\n"
+        << board.person.text();
+    board.board.link->lose_every(0);
+    EXPECT_TRUE(board.board.disarmed());
+    if (there->stage < Stage::calibration && std::string(there->name) != "no brake resistor at AUX") {
+      EXPECT_EQ(board.board.settings(), before);
+    }
+    // It goes on there, and not before.
+    EXPECT_EQ(board.person.begun.back(), text_of(there->stage).name);
+  });
 }
 
 TEST(BringUp, EachPlantedFaultIsFoundAtItsStageAndHarmsNothing) {
   EXPECT_GE(planted().size(), 20U);
-  for (const char* name : {"dc_coreless_a", "gimbal_b"}) {
-    std::vector<Planted> usual;
-    for (const Planted& one : planted()) {
-      if (std::string(one.scene) != name) continue;
-      simulation::Scene scene = with_index(name);
-      scene.supply->part_ratings = !one.breaks_parts;
-      if (one.source_resistance) scene.supply->resistance = *one.source_resistance;
-      if (one.settings || one.breaks_parts || one.source_resistance) {
-        find_each(scene, one.settings.value_or(Settings{}), {one});
-      } else {
-        usual.push_back(one);
-      }
+  std::map<std::string, std::vector<Planted>> usual;
+  for (const Planted& one : planted()) {
+    if (!one.settings && !one.breaks_parts && !one.source_resistance) {
+      usual[one.scene].push_back(one);
+      continue;
     }
-    simulation::Scene scene = with_index(name);
+    simulation::Scene scene = with_index(one.scene);
+    scene.supply->part_ratings = !one.breaks_parts;
+    scene.supply->resistance = one.source_resistance.value_or(usual_source_resistance);
+    find_each(scene, one.settings.value_or(Settings{}), {one});
+  }
+  for (const auto& [name, faults] : usual) {
+    simulation::Scene scene = with_index(name.c_str());
     scene.supply->part_ratings = true;
-    find_each(scene, {}, usual);
+    scene.supply->resistance = usual_source_resistance;
+    find_each(scene, {}, faults);
   }
 }
 

@@ -28,33 +28,32 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Persistent, testing::ValuesIn(representative_sc
 // is put back.
 TEST_P(Persistent, ACauseThatStaysIsTheDiagnosisOfTheStepThatMeetsIt) {
   const std::map<std::string, int>& lengths = length_of(GetParam()).in_step;
-  SharedBeginning beginning;
-  CalibratedDevice device(GetParam());
-  const auto before = device.parameters();
-  const Cause* there = nullptr;
-  std::string step;
-  device.on_progress = [&] {
-    if (there != nullptr || device.length.in_step[device.step] != 1 + lengths.at(device.step) / 2) return;
-    for (const Cause& cause : causes) {
-      if (!beginning.fork()) continue;
-      there = &cause;
-      step = device.step;
-      return cause.happens(device);
+  SharedBeginning::run([&](SharedBeginning& beginning) {
+    CalibratedDevice device(GetParam());
+    const auto before = device.parameters();
+    const Cause* there = nullptr;
+    device.on_progress = [&] {
+      if (there != nullptr || device.length.in_step[device.step] != 1 + lengths.at(device.step) / 2) return;
+      for (const Cause& cause : causes) {
+        if (!beginning.fork(std::string(cause.name) + " in " + device.step)) continue;
+        there = &cause;
+        return cause.happens(device);
+      }
+    };
+    const calibration::CalibrationReport report = device.calibrate();
+    if (there == nullptr) {
+      EXPECT_TRUE(report.pass()) << cause_of(report);
+      EXPECT_EQ(beginning.copies(), std::size(causes) * lengths.size());
+      return;
     }
-  };
-  calibration::CalibrationReport report;
-  ASSERT_NO_THROW(report = device.calibrate()) << (there == nullptr ? "" : there->name) << " in " << step;
-  if (there == nullptr) {
-    EXPECT_TRUE(report.pass()) << cause_of(report);
-    EXPECT_EQ(beginning.copies(), std::size(causes) * lengths.size());
-    return;
-  }
-  // A quadrature encoder that falls silent late is not always distinguished from a handle that is held.
-  const bool silent = std::string_view(there->name) == "encoder_dead" && cause_of(report) == "motor_blocked";
-  EXPECT_TRUE(silent || cause_of(report) == there->name) << cause_of(report) << " in " << step;
-  EXPECT_FALSE(report.stored);
-  EXPECT_FALSE(device.armed());
-  EXPECT_EQ(device.parameters(), before) << there->name << " in " << step;
+    // A quadrature encoder that falls silent late is not always distinguished from a handle that is held.
+    const bool silent =
+        std::string_view(there->name) == "encoder_dead" && cause_of(report) == "motor_blocked";
+    EXPECT_TRUE(silent || cause_of(report) == there->name) << cause_of(report);
+    EXPECT_FALSE(report.stored);
+    EXPECT_FALSE(device.armed());
+    EXPECT_EQ(device.parameters(), before);
+  });
 }
 
 // A host that is killed leaves no force: link.timeout is on meanwhile, and off again afterwards.

@@ -60,27 +60,29 @@ TEST(Procedure, ADryRunChangesNothing) {
 TEST(Procedure, AnInterruptionAnywherePutsEverythingBackSaysSoAndDisarms) {
   for (const char* scene : {"dc_coreless_b", "gimbal_a"}) {
     const std::map<std::string, int>& lengths = length_of(scene).in_step;
-    SharedBeginning beginning;
-    CalibratedDevice device(scene);
-    const auto before = device.parameters();
-    device.on_progress = [&] {
-      const int middle = 1 + lengths.at(device.step) / 2;
-      if (device.length.in_step[device.step] == middle && beginning.fork()) throw bench::Interrupted("test");
-    };
-    std::string said;
-    try {
-      EXPECT_TRUE(device.calibrate().pass()) << "nobody interrupts it";
-    } catch (const bench::Interrupted& interrupted) {
-      said = interrupted.what();
-    }
-    if (!beginning.in_copy()) {
-      EXPECT_EQ(beginning.copies(), lengths.size());
-      continue;
-    }
-    EXPECT_CONTAINS(said, "all parameters are as before");
-    EXPECT_FALSE(device.armed());
-    EXPECT_EQ(device.parameters(), before) << scene << " in " << device.step;
-    EXPECT_EQ(device.records(), 0u);
+    SharedBeginning::run([&](SharedBeginning& beginning) {
+      CalibratedDevice device(scene);
+      const auto before = device.parameters();
+      device.on_progress = [&] {
+        const int middle = 1 + lengths.at(device.step) / 2;
+        if (device.length.in_step[device.step] == middle && beginning.fork(device.step))
+          throw bench::Interrupted("test");
+      };
+      std::string said;
+      try {
+        EXPECT_TRUE(device.calibrate().pass()) << "nobody interrupts it";
+      } catch (const bench::Interrupted& interrupted) {
+        said = interrupted.what();
+      }
+      if (!beginning.in_copy()) {
+        EXPECT_EQ(beginning.copies(), lengths.size());
+        return;
+      }
+      EXPECT_CONTAINS(said, "all parameters are as before");
+      EXPECT_FALSE(device.armed());
+      EXPECT_EQ(device.parameters(), before) << scene;
+      EXPECT_EQ(device.records(), 0u);
+    });
   }
 }
 

@@ -15,26 +15,28 @@ bool force_is_possible(TestedAxis& tested) {
 }
 
 TEST(SelfTestLeaves, WhereverItIsInterruptedTheAxisIsDisarmedAndTheParametersAreAsBefore) {
-  SharedBeginning beginning;
-  TestedAxis tested("gimbal_b");
-  const auto before = tested.settings();
-  int steps = 0;
-  SelfTestSettings settings;
-  settings.link_exchanges = 10;
-  try {
-    run_selftest(*tested.device, settings, [&](const std::string&) {
-      if (++steps % 3 == 1 && beginning.fork()) throw std::runtime_error("interrupted");
-    });
-    EXPECT_FALSE(beginning.in_copy()) << steps;
-    EXPECT_GT(beginning.copies(), 8U);
-  } catch (const SelfTestEnded& error) {
-    const std::string text = error.what();
-    EXPECT_TRUE(text == "interrupted; the axis is disarmed; every parameter is as it was" ||
-                text == "interrupted; nothing was changed in the device")
-        << text;
-  }
-  EXPECT_TRUE(tested.disarmed()) << steps;
-  EXPECT_EQ(tested.settings(), before) << steps;
+  SharedBeginning::run([](SharedBeginning& beginning) {
+    TestedAxis tested("gimbal_b");
+    const auto before = tested.settings();
+    int messages = 0;
+    SelfTestSettings settings;
+    settings.link_exchanges = 10;
+    try {
+      run_selftest(*tested.device, settings, [&](const std::string& text) {
+        if (++messages % 3 == 1 && beginning.fork(text)) throw std::runtime_error("interrupted");
+      });
+      EXPECT_FALSE(beginning.in_copy());
+      EXPECT_GT(beginning.copies(), 8U);
+    } catch (const SelfTestEnded& error) {
+      const std::string text = error.what();
+      EXPECT_TRUE(text == "interrupted; the axis is disarmed; every parameter is as it was" ||
+                  text == "interrupted; nothing was changed in the device")
+          << text;
+      EXPECT_TRUE(beginning.in_copy());
+    }
+    EXPECT_TRUE(tested.disarmed());
+    EXPECT_EQ(tested.settings(), before);
+  });
 }
 
 TEST(SelfTestLeaves, WhatIsNoExceptionOfTheLibraryPassesThrough) {

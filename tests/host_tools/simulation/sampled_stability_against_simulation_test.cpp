@@ -51,6 +51,7 @@ Fate fate_of(const Loop& loop, double stiffness, double samples_per_e_fold,
   CoupledHandle handle = handle_of(loop, delay);
   const int whole = static_cast<int>(std::floor(loop.delay / loop.period));
   const double late = loop.delay - whole * loop.period;
+  // A ring; its size is a power of two, so that the index may wrap below 0.
   std::array<double, 16> under_way{};
   std::size_t newest = 0;
   const auto force_of = [&](int samples_ago) {
