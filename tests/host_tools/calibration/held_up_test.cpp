@@ -108,7 +108,7 @@ TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
     const auto before = tested.parameters();
     tested.held_up = [&] {
       if (left.erase(tested.step) != 0 && beginning.fork(tested.step)) held = tested.step;
-      return tested.step == held;
+      return beginning.in_copy() && tested.step == held;
     };
     std::string said;
     try {
