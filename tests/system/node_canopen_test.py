@@ -126,11 +126,11 @@ class BusBridge(unittest.TestCase):
         self.assertIn("/nowhere/bus", done.stderr)
 
 
-def run_script(test, script, argument):
+def run_script(test, script, *arguments):
     """Runs a script of the folder to its end, and returns what it prints."""
     node = shutil.which("node")
     test.assertTrue(node, "node is missing: Debian package nodejs")
-    done = subprocess.run([node, str(FOLDER / script), str(argument)], capture_output=True, text=True,
+    done = subprocess.run([node, str(FOLDER / script), *map(str, arguments)], capture_output=True, text=True,
                           timeout=10 * PATIENCE, check=False)
     test.assertEqual(done.returncode, 0, done.stdout + done.stderr)
     return done.stdout

@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[3]
 CONTROLLER = Path("/sys/devices/platform/vhci_hcd.0")
 TERMINAL = Path("/dev/ttyACM0")
 PORT = 3240
+SEGMENTS_KEPT_FOR_A_LATE_PC = 32  # docs/usb.md
 
 
 def wait_until(condition, what):
@@ -237,7 +238,7 @@ class BehindTheBoard(Cable):
     @unittest.skipUnless(CLIENT.exists(), f"left out: {CLIENT} is not installed (scripts/install_node_packages)")
     def test_a_master_not_written_here_commands_the_neighbour_through_it(self):
         with Bridge(self.channel) as bridge:
-            printed = run_script(self, "master.mjs", bridge.stream)
+            printed = run_script(self, "master.mjs", bridge.stream, SEGMENTS_KEPT_FOR_A_LATE_PC)
         self.assertIn(" 0 FAILED", printed)
         self.assertIn(" 0 left out", printed)
         self.assertEqual(kmax_json("get", "counters.missed_ticks",

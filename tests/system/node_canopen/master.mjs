@@ -1,7 +1,10 @@
 #!/usr/bin/env node
 // A CANopen master that was not written here, the npm package `canopen`, against node 1 on a bus.
-// usage: node master.mjs STREAM        STREAM: the Unix stream socket of bus_bridge.py
-//        node master.mjs --stand-in    tries the master itself, against a node of the same package
+// usage: node master.mjs STREAM [SEGMENTS]    STREAM: the Unix stream socket of bus_bridge.py
+//        node master.mjs --stand-in           tries the master itself, against a node of the same package
+//
+// SEGMENTS is how many segments of a block transfer the master takes at once, 1 to 127 and 127 where it is left out. What
+// an adapter keeps for a PC that is late bounds them there: the package never asks again for a block whose end is lost.
 //
 // One line for each step: `ok`, `FAILED` with the reason, or `left out` where the stand-in cannot do it. Exit code:
 // 0 nothing failed, 1 something did, 2 wrong usage.
@@ -21,12 +24,15 @@ const second = { request: 0x6a0 + node, response: 0x6b0 + node };
 const abort = { localControl: 0x08000021, deviceState: 0x08000022, unsupported: 0x06010000, readOnly: 0x06010002, noObject: 0x06020000, notMappable: 0x06040041,
                 tooLong: 0x06040042, noSubIndex: 0x06090011 };
 
-const argument = process.argv[2];
-if (process.argv.length !== 3 || (argument.startsWith('-') && argument !== '--stand-in')) {
-  console.error('usage: node master.mjs STREAM | --stand-in');
+const [argument, segmentsAtOnce = '127'] = process.argv.slice(2);
+const standIn = argument === '--stand-in';
+const understood = standIn ? process.argv.length === 3
+                           : [3, 4].includes(process.argv.length) && !argument.startsWith('-') &&
+                             /^[1-9][0-9]{0,2}$/.test(segmentsAtOnce) && Number(segmentsAtOnce) <= 127;
+if (!understood) {
+  console.error('usage: node master.mjs STREAM [SEGMENTS] | --stand-in        SEGMENTS: 1 to 127');
   process.exit(2);
 }
-const standIn = argument === '--stand-in';
 
 // --- the bus and the master
 
@@ -47,6 +53,7 @@ if (standIn) {
 }
 const master = new Device({ id: 126 });
 const { eds, sdo, nmt } = master;
+sdo.setBlockSize(Number(segmentsAtOnce));
 eds.addSdoClientParameter(node, 0x600 + node, 0x580 + node);
 eds.addHeartbeatConsumer(node, patience);
 eds.addEmcyConsumer(0x80 + node);
