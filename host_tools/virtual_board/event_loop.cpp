@@ -14,7 +14,7 @@ constexpr int most_events_at_one_instant = 10'000;
 }  // namespace
 
 EventLoop::EventLoop(Processor& processor) : processor_(processor) {
-  processor_.set_schedule({[this](BoardTime now) { catch_up(now); }, [this] { return next_event(); }});
+  processor_.set_schedule({[this](BoardTime now) { return catch_up(now); }, [this] { return next_event(); }});
 }
 
 BoardTime EventLoop::next_event() const {
@@ -23,7 +23,7 @@ BoardTime EventLoop::next_event() const {
   return next;
 }
 
-void EventLoop::catch_up(BoardTime now) {
+BoardTime EventLoop::catch_up(BoardTime now) {
   BoardTime instant = 0;
   int events_at_instant = 0;
   for (;;) {
@@ -36,7 +36,7 @@ void EventLoop::catch_up(BoardTime now) {
         due = peripheral;
       }
     }
-    if (due == nullptr || at > now) return;
+    if (due == nullptr || at > now) return at;
     events_at_instant = at == instant ? events_at_instant + 1 : 0;
     instant = at;
     if (events_at_instant > most_events_at_one_instant) {
@@ -51,8 +51,7 @@ RunEnd EventLoop::run_until(BoardTime limit) {
   for (;;) {
     catch_up(processor_.now());
     if (processor_.now() >= limit) return RunEnd::time_reached;
-    const BoardTime next = std::min(limit, next_event());
-    const RunEnd end = processor_.run_until(next);
+    const RunEnd end = processor_.run_until(limit);
     if (end == RunEnd::sleeping) {
       processor_.sleep_until(std::min(limit, next_event()));
     } else if (end != RunEnd::time_reached) {

@@ -7,10 +7,11 @@
 
 // Interleaves the processor with the peripherals' events, in order of time.
 //
-// The processor runs until the earliest next_event() of all peripherals, which are then advanced, and so on.
-// Register accesses may create earlier events at any moment: after every block with an access the limit is
-// taken again, and an access beyond the limit first advances what is due. An event is therefore late by less
-// than one block (see processor.hpp) for interrupts, and never for what firmware reads.
+// The processor runs, and at the begin of the first block behind the earliest next_event() of all peripherals
+// these are advanced, and so on. Register accesses may create earlier events at any moment: after every block
+// with an access the limit is taken again, and an access beyond the limit first advances what is due. An
+// event is therefore late by less than one block (see processor.hpp) for interrupts, and never for what
+// firmware reads.
 //
 // The order of peripherals whose events fall on the same instant is the order of add(). A peripheral whose
 // next_event() does not move on after advance() is a defect and throws std::logic_error.
@@ -29,8 +30,9 @@ class EventLoop {
   /// Runs processor and peripherals until `limit`; never returns RunEnd::sleeping.
   RunEnd run_until(BoardTime limit);
 
-  /// Advances everything that is due at `now` or before, in order of time.
-  void catch_up(BoardTime now);
+  /// Advances everything that is due at `now` or before, in order of time. Returns next_event(), later than
+  /// that.
+  BoardTime catch_up(BoardTime now);
   BoardTime next_event() const;
 
  private:

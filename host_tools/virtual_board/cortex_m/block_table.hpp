@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -12,7 +13,9 @@
 // What each block of instructions costs, worked out when it is met for the first time and remembered by
 // address and size.
 //
-// Cost of a look-up: one array access for blocks whose slot nobody else has taken, a hash table's otherwise.
+// Cost of a look-up: an array access and that to the block for blocks whose slot nobody else has taken, a
+// hash table's otherwise. A tick of the firmware begins some hundred blocks, so that the cache lines that
+// they take are what counts: slots and blocks are small, and blocks lie in the order in which they were met.
 // Code that is changed after it has run keeps its old costs.
 
 namespace kmax::virtual_board {
@@ -25,44 +28,65 @@ struct MemoryInstruction {
   MemoryOperand operand;
 };
 
+/// Blocks end with their page, which is 1 KiB.
+inline constexpr std::size_t longest_block = 1024;
+
 struct Block {
   std::uint32_t address = 0;
-  std::uint32_t size = 0;
-  std::uint32_t instructions = 0;
-  std::uint32_t cycles = 0;
-  std::uint32_t cycles_if_taken = 0;  ///< more, when the block does not go on to the one behind it
-  bool floating_point = false;
-  std::uint32_t first_floating_point = 0;  ///< address
-  /// Cut by the end of a page (1 KiB) between an IT instruction and the last one that it governs.
-  bool ends_inside_if_then = false;
-  bool endless = false;  ///< a branch to itself, and nothing else
-  std::vector<MemoryInstruction> memory;
+  std::uint32_t first_memory_instruction = 0;  ///< BlockTable::memory_instructions()
+  std::uint16_t size = 0;
+  std::uint16_t cycles = 0;
+  std::uint32_t instructions : 10 = 0;
+  std::uint32_t memory_instructions : 10 = 0;
+  std::uint32_t cycles_if_taken : 4 = 0;  ///< more, when the block does not go on to the one behind it
+  std::uint32_t floating_point : 1 = 0;   ///< there is such an instruction in it
+  /// Cut by the end of a page between an IT instruction and the last one that it governs.
+  std::uint32_t ends_inside_if_then : 1 = 0;
+  std::uint32_t endless : 1 = 0;  ///< a branch to itself, and nothing else
+
+  std::uint32_t end() const { return address + size; }
 };
+static_assert(sizeof(Block) == 16, "four in a cache line");
+
+/// Address of the first floating-point instruction of a block's bytes.
+std::uint32_t first_floating_point(std::uint32_t address, std::span<const std::uint8_t> code);
 
 class BlockTable {
  public:
-  BlockTable() : slots_(slot_count, nullptr) {}
+  BlockTable() : slots_(slot_count, 0) { chunks_.push_back(std::make_unique<Chunk>()); }
 
-  /// None when the block was not met before.
+  /// None when the block was not met before. A block stays where it is.
   const Block* find(std::uint32_t address, std::uint32_t size) {
-    const Block*& slot = slots_[address / 2 % slot_count];
-    if (slot != nullptr && slot->address == address && slot->size == size) return slot;
-    const auto found = blocks_.find(key(address, size));
-    if (found == blocks_.end()) return nullptr;
-    return slot = found->second.get();
+    std::uint32_t& slot = slots_[address / 2 % slot_count];
+    const Block& block = at(slot);
+    if (block.address == address && block.size == size && slot != 0) return &block;
+    return find_elsewhere(address, size, slot);
   }
 
-  /// Decodes the block from its bytes.
+  /// Decodes the block from its bytes. Throws std::length_error when they are more than `longest_block`.
   const Block& add(std::uint32_t address, std::span<const std::uint8_t> code);
 
+  /// The loads and stores of one of its blocks, in their order.
+  std::span<const MemoryInstruction> memory_instructions(const Block& block) const {
+    return std::span(memory_).subspan(block.first_memory_instruction, block.memory_instructions);
+  }
+
  private:
-  static constexpr std::size_t slot_count = 1U << 16;
+  static constexpr std::size_t slot_count = 1U << 16, blocks_in_a_chunk = 1024;
+  using Chunk = std::array<Block, blocks_in_a_chunk>;
   static std::uint64_t key(std::uint32_t address, std::uint32_t size) {
     return std::uint64_t{size} << 32 | address;
   }
+  const Block& at(std::uint32_t number) const {
+    return (*chunks_[number / blocks_in_a_chunk])[number % blocks_in_a_chunk];
+  }
+  const Block* find_elsewhere(std::uint32_t address, std::uint32_t size, std::uint32_t& slot);
 
-  std::vector<const Block*> slots_;
-  std::unordered_map<std::uint64_t, std::unique_ptr<Block>> blocks_;
+  std::vector<std::uint32_t> slots_;            ///< numbers of blocks; 0: none
+  std::vector<std::unique_ptr<Chunk>> chunks_;  ///< by number
+  std::uint32_t last_ = 0;                      ///< its number
+  std::vector<MemoryInstruction> memory_;       ///< of all blocks, one behind the other
+  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
 };
 
 /// Finds out which instruction of a block makes an access. The emulator tells address and direction of an
@@ -73,25 +97,26 @@ class BlockTable {
 /// on other memory (not on registers) with a base that has since changed, or was skipped by IT.
 class AccessLocator {
  public:
-  void begin_block(const Block& block) {
-    block_ = &block;
+  void begin_block() {
     next_ = 0;
     words_left_ = 0;
   }
 
-  /// `core_register(n)` gives r0 to r15. None when no instruction qualifies.
+  /// In `block`, its loads and stores. `core_register(n)` gives r0 to r15. None when no instruction
+  /// qualifies.
   template <typename CoreRegister>
-  const MemoryInstruction* locate(std::uint32_t address, bool store, CoreRegister core_register) {
+  const MemoryInstruction* locate(std::span<const MemoryInstruction> block, std::uint32_t address, bool store,
+                                  CoreRegister core_register) {
     // The base of a multiple access may have been loaded meanwhile; only the first of its words is looked
     // for.
     if (words_left_ != 0 && address == expected_) {
       --words_left_;
       expected_ += 4;
       offset_ += 4;
-      return &block_->memory[next_ - 1];
+      return &block[next_ - 1];
     }
-    for (std::size_t index = next_; index < block_->memory.size(); ++index) {
-      const MemoryInstruction& candidate = block_->memory[index];
+    for (std::size_t index = next_; index < block.size(); ++index) {
+      const MemoryInstruction& candidate = block[index];
       const MemoryOperand& operand = candidate.operand;
       if (operand.store != store) continue;
       std::uint32_t effective = operand.offset;
@@ -113,7 +138,6 @@ class AccessLocator {
   bool is_piece(unsigned bytes) const { return offset_ % 4 != 0 || bytes < (span_ < 4 ? span_ : 4U); }
 
  private:
-  const Block* block_ = nullptr;
   std::size_t next_ = 0;
   std::uint32_t words_left_ = 0;
   std::uint32_t expected_ = 0;

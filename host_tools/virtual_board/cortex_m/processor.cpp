@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 #include <unicorn/unicorn.h>
@@ -108,8 +109,10 @@ RunEnd Processor::run_until(BoardTime limit) {
       return RunEnd::stopped;
     }
     if (locked_up_) {
-      now_ = std::max(now_, limit_);
-      return RunEnd::time_reached;
+      now_ = std::max(now_, next_limit());
+      if (now_ >= run_limit_) return RunEnd::time_reached;
+      schedule_.catch_up(now_);
+      continue;
     }
     if (core_.exceptions.preempting()) {
       const ExceptionMasks special = masks();
@@ -119,7 +122,11 @@ RunEnd Processor::run_until(BoardTime limit) {
         continue;
       }
     }
-    if (now_ >= limit_) return RunEnd::time_reached;
+    if (now_ >= run_limit_) return RunEnd::time_reached;
+    if (now_ >= limit_) {
+      limit_ = std::min(run_limit_, schedule_.catch_up(now_));
+      continue;
+    }
     if (sleeping_) return RunEnd::sleeping;
     execute();
   }
@@ -139,6 +146,7 @@ void Processor::execute() {
   const StoresBesideCode::Running running(stores_);
   const uc_err error = uc_emu_start(engine_.handle(), pc_ | 1U, 0, 0, 0);
   pc_ = engine_.get(UC_ARM_REG_PC);
+  if (problem_of_event_) std::rethrow_exception(std::exchange(problem_of_event_, nullptr));
   after_execution(error);
 }
 

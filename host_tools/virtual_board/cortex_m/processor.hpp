@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <string>
 
@@ -64,8 +66,9 @@ struct ProcessorConfig {
 
 /// How the processor asks the rest of the board for time; EventLoop provides it.
 struct Schedule {
-  std::function<void(BoardTime now)> catch_up;  ///< advance every peripheral to `now`
-  std::function<BoardTime()> next_event;        ///< the earliest one of all peripherals
+  /// Advance every peripheral to `now`; returns next_event(), which is later.
+  std::function<BoardTime(BoardTime now)> catch_up;
+  std::function<BoardTime()> next_event;  ///< the earliest one of all peripherals
 };
 
 class Processor {
@@ -96,7 +99,8 @@ class Processor {
   /// Time and counters go on. Throws std::runtime_error when the flash holds no vector table.
   void reset(BoardTime now);
 
-  /// Runs until `limit` is reached or something else ends the run.
+  /// Runs until `limit` is reached or something else ends the run. What is due of the schedule before is
+  /// done at the next block's begin. What it throws ends the run and is thrown here.
   RunEnd run_until(BoardTime limit);
   /// While sleeping: lets the time pass without executing.
   void sleep_until(BoardTime time);
@@ -159,6 +163,9 @@ class Processor {
   void note_code_in_ram(std::uint32_t address);
   bool must_stop();
   void charge(std::uint64_t cycles);
+  BoardTime next_limit() const {
+    return schedule_.next_event ? std::min(run_limit_, schedule_.next_event()) : run_limit_;
+  }
   std::uint32_t read_register(std::uint32_t address, unsigned bytes);
   void write_register(std::uint32_t address, unsigned bytes, std::uint32_t value);
   void begin_access(std::uint32_t address, unsigned bytes, bool store);
@@ -232,6 +239,7 @@ class Processor {
   std::uint32_t access_pc_ = 0;        ///< instruction of the latest register access
   BadAccess bad_access_;
   bool bad_access_pending_ = false;
+  std::exception_ptr problem_of_event_;
   std::string fault_;
 };
 

@@ -172,11 +172,10 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   // Unicorn forgets the IT state when it is stopped between the two halves of an IT block that the end of a
   // page cuts, and both ways would then be the same: interrupts wait for the block after.
   const bool inside_if_then =
-      block_ != nullptr && block_->ends_inside_if_then && address == block_->address + block_->size;
+      block_ != nullptr && block_->ends_inside_if_then != 0 && address == block_->end();
   if (block_ != nullptr) {
     // Only here is it known which way the last block's branch went.
-    if (block_->cycles_if_taken != 0 && address != block_->address + block_->size)
-      charge(block_->cycles_if_taken);
+    if (block_->cycles_if_taken != 0 && address != block_->end()) charge(block_->cycles_if_taken);
     block_ = nullptr;
   }
   const bool interesting = attention_ || now_ >= limit_ || core_.exceptions.preempting() ||
@@ -188,10 +187,10 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   }
   const Block* block = blocks_.find(address, size);
   if (block == nullptr) block = &blocks_.add(address, bus_.memory(address, size));
-  if (block->floating_point) {
+  if (block->floating_point != 0) {
     if (!core_.system_control.fpu_enabled()) {
       fail(fmt::format("floating-point instruction at {} while CPACR keeps the FPU off",
-                       place(block->first_floating_point)));
+                       place(first_floating_point(address, bus_.memory(address, size)))));
       event_ = Event::block_end;
       uc_emu_stop(engine_.handle());
       return;
@@ -203,13 +202,13 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   }
   if (on_block_) on_block_(address, size);
   block_ = block;
-  locator_.begin_block(*block);
+  locator_.begin_block();
   const bool by_instruction = config_.units_per_instruction != 0;
   block_period_ = by_instruction ? config_.units_per_instruction : clocks_.core;
   std::uint64_t cycles = by_instruction ? block->instructions : block->cycles;
   std::uint64_t rounds = 1;
   // Until the next event nothing can end an endless loop but stop(), which is looked for now and then.
-  if (block->endless && !inside_if_then && !on_block_ && limit_ > now_)
+  if (block->endless != 0 && !inside_if_then && !on_block_ && limit_ > now_)
     rounds = std::min<std::uint64_t>((limit_ - now_ - 1) / (cycles * block_period_) + 1, 10'000);
   cycles *= rounds;
   instructions_ += rounds * block->instructions;
@@ -227,11 +226,21 @@ void Processor::note_code_in_ram(std::uint32_t address) {
   stores_.note_code_in_ram();
 }
 
-/// Something is up: find out what. Also takes the limit again when registers were accessed.
+/// Something is up: find out what. Takes the limit again when registers were accessed, and lets the
+/// peripherals do what is due: to leave the engine for each of their events would take longer than most.
 bool Processor::must_stop() {
+  if (attention_) limit_ = next_limit();
+  if (now_ >= limit_ && now_ < run_limit_) {
+    attention_ = true;
+    try {
+      limit_ = std::min(run_limit_, schedule_.catch_up(now_));
+    } catch (...) {
+      problem_of_event_ = std::current_exception();
+      return true;
+    }
+  }
   if (attention_) {
     attention_ = false;
-    if (schedule_.next_event) limit_ = std::min(run_limit_, schedule_.next_event());
     if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested() || !rights_are_applied())
       return true;
   }
@@ -244,7 +253,8 @@ void Processor::begin_access(std::uint32_t address, unsigned bytes, bool store) 
   attention_ = true;
   if (block_ == nullptr) return;
   const MemoryInstruction* instruction =
-      locator_.locate(address, store, [this](unsigned number) { return core_register(number); });
+      locator_.locate(blocks_.memory_instructions(*block_), address, store,
+                      [this](unsigned number) { return core_register(number); });
   if (instruction == nullptr) {
     access_pc_ = block_->address;
   } else {
@@ -343,7 +353,8 @@ bool Processor::invalid_memory(int type, std::uint32_t address, unsigned bytes, 
   std::uint32_t pc = address;
   if (!fetch && block_ != nullptr) {
     const MemoryInstruction* instruction =
-        locator_.locate(address, store, [this](unsigned number) { return core_register(number); });
+        locator_.locate(blocks_.memory_instructions(*block_), address, store,
+                        [this](unsigned number) { return core_register(number); });
     pc = block_->address + (instruction != nullptr ? instruction->position : 0U);
     // The rest of the block does not run.
     if (instruction != nullptr) {

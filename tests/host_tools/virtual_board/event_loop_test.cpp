@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <stdexcept>
+#include <vector>
 
 #include "drivers/cortex_m/registers.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
@@ -86,6 +87,48 @@ TEST(EventLoop, TakesAnEventIntoAccountThatAnAccessBringsForward) {
   EXPECT_EQ(board.block.advanced[0], 41 * cycle);
   EXPECT_GE(board.get(2), 9U);
   EXPECT_LE(board.get(2), 11U);
+}
+
+TEST(EventLoop, WhatAnEventThrowsEndsTheRunInTheMiddleOfAProgram) {
+  ProgramOnCore board({0x3201, 0xE7FD});  // loop: adds r2, #1; b back
+  board.set(2, 0);
+  board.block.event = 40 * cycle;
+  board.block.next_after = [](BoardTime) -> BoardTime { throw std::runtime_error("the supply is gone"); };
+  try {
+    board.run();
+    FAIL() << "it goes on";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "the supply is gone");
+  }
+  EXPECT_EQ(board.get(2), 10U) << "4 cycles a round";
+  board.block.next_after = [](BoardTime) { return never; };
+  EXPECT_EQ(board.run(80 * cycle), RunEnd::time_reached);
+  EXPECT_EQ(board.get(2), 20U) << "where it was";
+}
+
+TEST(EventLoop, AnEventThatStopsTheProcessorStopsItThere) {
+  ProgramOnCore board({0x3201, 0xE7FD});
+  board.set(2, 0);
+  board.block.event = 40 * cycle;
+  board.block.next_after = [&](BoardTime) {
+    board.processor.stop();
+    return never;
+  };
+  EXPECT_EQ(board.run(), RunEnd::stopped);
+  EXPECT_EQ(board.get(2), 10U);
+}
+
+TEST(EventLoop, EventsComeWhenDueWhileTheCoreIsLockedUp) {
+  ProcessorConfig config{.faults_to_firmware = true, .locks_up = true};
+  const Program undefined{0xDE00};
+  ProgramOnCore board(undefined, config);
+  board.handler(exception_number::hard_fault, undefined);
+  board.block.event = 1000;
+  board.block.next_after = [](BoardTime now) { return now + 1000; };
+  EXPECT_EQ(board.run(5500), RunEnd::time_reached);
+  EXPECT_TRUE(board.processor.locked_up());
+  EXPECT_EQ(board.block.advanced, (std::vector<BoardTime>{1000, 2000, 3000, 4000, 5000}));
+  EXPECT_EQ(board.processor.now(), 5500U);
 }
 
 TEST(EventLoop, TicksWithoutDrift) {
