@@ -64,11 +64,12 @@ void Bus::attach(std::uint32_t base, std::uint32_t size, std::string name, Perip
 }
 
 const Bus::Block* Bus::find(std::uint32_t address) const {
+  if (last_found_ != nullptr && last_found_->range.contains(address)) return last_found_;
   for (std::size_t area = 0; area < pages_.size(); ++area) {
     const AddressRange range = memory_map::register_areas[area];
     if (!range.contains(address)) continue;
     for (const Block* block : pages_[area][(address - range.base) >> page_shift]) {
-      if (block->range.contains(address)) return block;
+      if (block->range.contains(address)) return last_found_ = block;
     }
     return nullptr;
   }

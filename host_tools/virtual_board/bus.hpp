@@ -113,6 +113,7 @@ class Bus {
   std::vector<std::uint8_t> ccm_;
   std::vector<std::unique_ptr<Block>> blocks_;
   std::array<std::vector<Page>, memory_map::register_areas.size()> pages_;
+  mutable const Block* last_found_ = nullptr;  ///< firmware often has several registers of a block in turn
   ParameterStore parameter_store_;
   std::uint64_t register_waits_ = 0;
   bool sram_at_zero_ = false;

@@ -31,9 +31,10 @@ class LineSpikes {
       const double after = config_->at_samples ? 4e-6 * noise_.uniform() : edge(noise_.uniform());
       next_[line] = now + units_of(after);
     }
+    look_ahead();
   }
   bool on(Line line) const { return on_[line]; }
-  BoardTime next_event() const { return *std::min_element(next_.begin(), next_.end()); }
+  BoardTime next_event() const { return earliest_; }
   void advance(BoardTime now) {
     for (std::size_t line = 0; line < line_count; ++line) {
       if (next_[line] > now) continue;
@@ -42,10 +43,12 @@ class LineSpikes {
       next_[line] = on_[line] ? next_[line] + units_of(config_->width) : never;
       change_(static_cast<Line>(line), now);
     }
+    look_ahead();
   }
   std::uint64_t begun() const { return begun_; }
 
  private:
+  void look_ahead() { earliest_ = *std::min_element(next_.begin(), next_.end()); }
   static BoardTime units_of(double s) {
     return static_cast<BoardTime>(s * static_cast<double>(units_per_second));
   }
@@ -71,6 +74,7 @@ class LineSpikes {
   std::optional<simulation::SpikesConfig> config_;
   simulation::NoiseGenerator noise_{1};
   std::array<BoardTime, line_count> next_ = none;
+  BoardTime earliest_ = never;  ///< of next_
   std::array<bool, line_count> on_{};
   std::uint64_t begun_ = 0;
   std::function<void(Line, BoardTime)> change_;

@@ -43,7 +43,7 @@ void IwdgModel::freeze(bool frozen, BoardTime now) {
 
 BoardTime IwdgModel::fires_at() const {
   if (!running_ || fired_ || frozen_at_ != never) return never;
-  return counted_from_ + cycles(remaining_ * stm32::iwdg_pr::divider(active_pr_));
+  return counted_from_ + until_reset_;
 }
 
 BoardTime IwdgModel::next_event() const {
@@ -53,9 +53,14 @@ BoardTime IwdgModel::next_event() const {
 
 void IwdgModel::take_prescaler_over(BoardTime now) {
   const std::uint64_t counted = elapsed_cycles(now) / stm32::iwdg_pr::divider(active_pr_);
-  remaining_ -= std::min(counted, remaining_ - 1);
-  counted_from_ = now;
   active_pr_ = pr_;
+  count_from(now, remaining_ - std::min(counted, remaining_ - 1));
+}
+
+void IwdgModel::count_from(BoardTime now, std::uint64_t remaining) {
+  counted_from_ = now;
+  remaining_ = remaining;
+  until_reset_ = cycles(remaining * stm32::iwdg_pr::divider(active_pr_));
 }
 
 void IwdgModel::advance(BoardTime now) {
@@ -106,8 +111,7 @@ void IwdgModel::write_key(const Access& access, std::uint32_t key) {
     if (rlr_effective_ != never) rlr_effective_ = access.now + cycles(update_cycles);
   }
   if (starts || key == stm32::iwdg_kr::reload) {
-    counted_from_ = access.now;
-    remaining_ = std::uint64_t{active_rlr_} + 1;
+    count_from(access.now, std::uint64_t{active_rlr_} + 1);
   }
   if (starts && on_started_) on_started_(access.now);
 }

@@ -49,6 +49,7 @@ class IwdgModel final : public RegisterBlock<IwdgModel> {
   BoardTime cycles(std::uint64_t count) const;
   std::uint64_t elapsed_cycles(BoardTime now) const;
   void take_prescaler_over(BoardTime now);
+  void count_from(BoardTime now, std::uint64_t remaining);
   static const RegisterTable<IwdgModel>& registers();
   std::uint32_t read_status() const;
   void write_key(const Access& access, std::uint32_t key);
@@ -70,6 +71,7 @@ class IwdgModel final : public RegisterBlock<IwdgModel> {
   BoardTime frozen_at_ = never;
   BoardTime counted_from_ = 0;   // start of `remaining_`
   std::uint64_t remaining_ = 0;  // prescaled cycles from there to the reset
+  BoardTime until_reset_ = 0;    // as time: it is asked for more often than it changes
 };
 
 }  // namespace kmax::virtual_board

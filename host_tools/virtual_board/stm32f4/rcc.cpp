@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <stdexcept>
 #include <string>
+
+#include <fmt/format.h>
 
 namespace kmax::virtual_board {
 
@@ -207,8 +210,19 @@ void RccModel::note_reset(stm32::ResetCause cause) {
   csr_ |= rcc_csr::Pin::mask;
 }
 
-bool RccModel::clock_enabled(std::uint32_t offset, std::uint32_t mask) {
-  return (table().read(*this, block(), {offset, 4, 0}) & mask) == mask;
+const std::uint32_t& RccModel::enable_word(std::size_t offset) const {
+  switch (offset) {
+    case offsetof(RccRegisters, ahb1enr):
+      return ahb1enr_;
+    case offsetof(RccRegisters, ahb2enr):
+      return ahb2enr_;
+    case offsetof(RccRegisters, apb1enr):
+      return apb1enr_;
+    case offsetof(RccRegisters, apb2enr):
+      return apb2enr_;
+    default:
+      throw std::out_of_range(fmt::format("offset {} of RCC is no enable register that is modelled", offset));
+  }
 }
 
 std::uint32_t RccModel::ready_flags(BoardTime now) const {

@@ -66,9 +66,9 @@ class RccModel final : public RegisterBlock<RccModel> {
   /// The reset flags stay: note_reset() sets them.
   void reset(BoardTime now) override;
 
-  /// Whether all bits of `mask` are set in the enable register at `offset`, e.g. offsetof(RccRegisters,
-  /// apb1enr).
-  bool clock_enabled(std::uint32_t offset, std::uint32_t mask);
+  /// What the enable register at `offset` holds, e.g. offsetof(RccRegisters, apb1enr); it stays where it is.
+  /// Throws std::out_of_range for any other register.
+  const std::uint32_t& enable_word(std::size_t offset) const;
   /// What the reset flags will say; call it with reset(). Also as after construction: power_on.
   void note_reset(drivers::stm32f4::ResetCause cause);
   /// The watchdog has started the low-speed oscillator.
