@@ -57,18 +57,18 @@ TEST_F(DesignCommand, FinishesFromSharesWithTheSameWall) {
 
 TEST_F(DesignCommand, TakesTheDeviceFromADump) {
   folder.write("handle.toml",
-               "[device]\nmass = 0.06\n[guard]\nfriction = 0.2\n[haptic]\nrate = 1000\n[force]\nlimit = 3\n"
+               "[device]\nmass = 0.06\n[guard]\nfriction = 0.2\n[haptic]\nrate = 250\n[force]\nlimit = 3\n"
                "[encoder]\ncounts_per_turn = 65536\n");
   ASSERT_EQ(design({"--device", in("handle.toml"), "--save", in("wall.toml")}), done) << said;
   const std::string text = folder.read("wall.toml");
   EXPECT_CONTAINS(text, "0.06 kg, friction 0.2 N");
-  EXPECT_CONTAINS(text, "Loop of 1000 Hz");
+  EXPECT_CONTAINS(text, "Loop of 250 Hz");
   EXPECT_CONTAINS(text, "up to 3 N");
   EXPECT_CONTAINS(said, "guard.damping is 0, not entered");
 }
 
 TEST_F(DesignCommand, ThatNoWallHoldsIsAVerdict) {
-  EXPECT_EQ(design({"--depth", "0.001mm"}), verdict_is_no);
+  EXPECT_EQ(design({"--rate", "250Hz", "--depth", "0.001mm"}), verdict_is_no);
   EXPECT_CONTAINS(words(), "Allow more with --depth");
 }
 
