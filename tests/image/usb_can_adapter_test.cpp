@@ -451,6 +451,23 @@ TEST_F(UsbCanAdapter, TheFrameThatWaitsInTheEndpointGoesWithItsSession) {
   }
 }
 
+// docs/usb.md: a master may take so many segments at once from a node behind the adapter, one after the
+// other.
+TEST_F(UsbCanAdapter, ABlockOf32SegmentsOfAnotherNodeWaitsForALatePc) {
+  for (const std::uint32_t segments : {32U, 127U}) {
+    forget();
+    pc.stop_reading();
+    for (std::uint32_t i = 0; i < segments; ++i) second.send(numbered(0x100, i));
+    bench.board->run_for(0.1);
+    EXPECT_TRUE(seen_of(bus, 0x100).empty());
+    EXPECT_EQ(bench.number("counters.usb_frames_lost") != 0, segments == 127) << "more than it keeps";
+    pc.start_reading();
+    bench.board->run_for(0.02);
+    EXPECT_EQ(seen_of(bus, 0x100).size() == segments, segments == 32);
+    expect_in_order(seen_of(bus, 0x100));
+  }
+}
+
 TEST_F(UsbCanAdapter, APcThatDoesNotReadLosesFramesAndHoldsUpNobody) {
   ASSERT_TRUE(arm());
   pc.stop_reading();
