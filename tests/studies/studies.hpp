@@ -292,8 +292,7 @@ plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult
 report::Section baseline_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
 report::Section relation_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
 
-// --- Stiffness against damping (damping_map.cpp)
-// ------------------------------------------------------------
+// --- Stiffness against damping (damping_map.cpp) ----------------------------------------------------------
 
 /// What is changed of loop and device, one thing at a time.
 struct LoopSetting {
@@ -321,8 +320,7 @@ report::Section damping_section(const SubjectSet& set, const std::vector<Damping
 /// Throws plot::FigureError.
 report::Picture draw_damping_map(const DampingMap& map, const std::filesystem::path& file);
 
-// --- Walls that grow stiff (growing_walls.cpp)
-// ---------------------------------------------------------------
+// --- Walls that grow stiff (growing_walls.cpp) ------------------------------------------------------------
 
 /// wall.touch_stiffness, wall.growth_time, and a damper over one sample. N/m, s, N s/m.
 WallChange growing(double touch_stiffness, double growth_time, double damping);
