@@ -120,8 +120,10 @@ TEST(MaxStiffnessSearch, GrowingStepsMeetTheSameLimitWithinTheirSize) {
   EXPECT_NEAR(growing, equal, 0.03 * equal + 100.0);
 }
 
-// An integrator that shares nothing with the exact scheme, at 1 us, from three steps below the limit on.
-TEST(MaxStiffnessSearch, TheExactSchemeAgreesWithAReferenceOfOneMicrosecond) {
+// An integrator that shares nothing with the exact scheme, at 10 us, from three steps below the limit on. At
+// 125 us it is as exact as the scheme already (docs/speed_and_error.md), and at 1 us it finds the same eight
+// walls.
+TEST(MaxStiffnessSearch, TheExactSchemeAgreesWithAReferenceOfTenMicroseconds) {
   TouchProtocol protocol;
   protocol.approach_speeds = {0.1, 0.5};
   protocol.pushes = {0.3, 1.0};
@@ -135,7 +137,7 @@ TEST(MaxStiffnessSearch, TheExactSchemeAgreesWithAReferenceOfOneMicrosecond) {
     }
     const MaxStiffness exact = search_max_stiffness(setup, protocol, {});
     setup.integrator.kind = simulation::IntegratorKind::rk4;
-    setup.integrator.substeps = 2000.0;
+    setup.integrator.substeps = 200.0;
     const StiffnessSteps near{
         .first = exact.stiffness - 300.0, .step = 100.0, .last = exact.stiffness + 300.0};
     const MaxStiffness reference = search_max_stiffness(setup, protocol, near);
