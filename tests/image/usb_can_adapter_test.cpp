@@ -451,8 +451,8 @@ TEST_F(UsbCanAdapter, TheFrameThatWaitsInTheEndpointGoesWithItsSession) {
   }
 }
 
-// docs/usb.md: a master may take so many segments at once from a node behind the adapter, one after the
-// other.
+// docs/usb.md: a master may take so many segments at once from a node behind the adapter where nothing else
+// is said, one after the other.
 TEST_F(UsbCanAdapter, ABlockOf32SegmentsOfAnotherNodeWaitsForALatePc) {
   for (const std::uint32_t segments : {32U, 127U}) {
     forget();

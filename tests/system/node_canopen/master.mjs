@@ -4,7 +4,8 @@
 //        node master.mjs --stand-in           tries the master itself, against a node of the same package
 //
 // SEGMENTS is how many segments of a block transfer the master takes at once, 1 to 127 and 127 where it is left out. What
-// an adapter keeps for a PC that is late bounds them there: the package never asks again for a block whose end is lost.
+// an adapter keeps for a PC that is late limits them behind an adapter, for the two masters here together: the package
+// never asks again for a block whose end is lost.
 //
 // One line for each step: `ok`, `FAILED` with the reason, or `left out` where the stand-in cannot do it. Exit code:
 // 0 nothing failed, 1 something did, 2 wrong usage.
@@ -63,6 +64,7 @@ master.on('message', (message) => bus.send(message));
 bus.on('frame', (message) => master.receive(message));
 master.start();
 const other = new Device({ id: 124 }); // at the second SDO server
+other.sdo.setBlockSize(Number(segmentsAtOnce));
 other.eds.addSdoClientParameter(node, second.request, second.response);
 other.on('message', (message) => bus.send(message));
 bus.on('frame', (message) => other.receive(message));
