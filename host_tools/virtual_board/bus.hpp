@@ -23,7 +23,8 @@
 // leads, VTOR being 0; or SRAM1, for code to be fetched over the instruction bus. Stores there are refused.
 // Bit-band aliases and the FSMC banks are not mapped.
 //
-// Cost: one array look-up per access (30 ns with the virtual call and the emulator's own part).
+// Cost: one array look-up per access to another block than the last (30 ns with the virtual call and the
+// emulator's own part).
 
 namespace kmax::virtual_board {
 

@@ -7,11 +7,11 @@
 
 // Interleaves the processor with the peripherals' events, in order of time.
 //
-// The processor runs, and at the begin of the first block behind the earliest next_event() of all peripherals
-// these are advanced, and so on. Register accesses may create earlier events at any moment: after every block
-// with an access the limit is taken again, and an access beyond the limit first advances what is due. An
-// event is therefore late by less than one block (see processor.hpp) for interrupts, and never for what
-// firmware reads.
+// The processor runs, and at the beginning of the first block behind the earliest next_event() of all
+// peripherals these are advanced, and so on. Register accesses may create earlier events at any moment: after
+// every block with an access the limit is taken again, and an access beyond the limit first advances what is
+// due. An event is therefore late by less than one block (see processor.hpp) for interrupts, and never for
+// what firmware reads.
 //
 // The order of peripherals whose events fall on the same instant is the order of add(). A peripheral whose
 // next_event() does not move on after advance() is a defect and throws std::logic_error.

@@ -135,8 +135,10 @@ void cut_all_along(const std::vector<std::uint8_t>& before) {
     bench.set(new_set);
     bench.board().flash().cut_power_after(cut, cut * 7919);
     ASSERT_FALSE(bench.save()) << "cut " << cut;
+    const auto cut_at = bench.board().now();
     bench.board().cycle_power();
     bench.board().run_for(0.03);
+    ASSERT_GE(virtual_board::seconds(bench.board().now() - cut_at), 0.03) << "cut " << cut;
     const Set found = bench.get();
     if (found == new_set) {
       ++new_sets;

@@ -13,7 +13,7 @@
 // What each block of instructions costs, worked out when it is met for the first time and remembered by
 // address and size.
 //
-// Cost of a look-up: an array access and that to the block for blocks whose slot nobody else has taken, a
+// Cost of a look-up: two accesses, to the slot and to the block, where nobody else has taken the slot, a
 // hash table's otherwise. A tick of the firmware begins some hundred blocks, so that the cache lines that
 // they take are what counts: slots and blocks are small, and blocks lie in the order in which they were met.
 // Code that is changed after it has run keeps its old costs.
@@ -48,7 +48,7 @@ struct Block {
 };
 static_assert(sizeof(Block) == 16, "four in a cache line");
 
-/// Address of the first floating-point instruction of a block's bytes.
+/// Address of the first floating-point instruction of a block's bytes; their end where there is none.
 std::uint32_t first_floating_point(std::uint32_t address, std::span<const std::uint8_t> code);
 
 class BlockTable {
@@ -84,7 +84,7 @@ class BlockTable {
 
   std::vector<std::uint32_t> slots_;            ///< numbers of blocks; 0: none
   std::vector<std::unique_ptr<Chunk>> chunks_;  ///< by number
-  std::uint32_t last_ = 0;                      ///< its number
+  std::uint32_t last_ = 0;                      ///< number of the newest block
   std::vector<MemoryInstruction> memory_;       ///< of all blocks, one behind the other
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
 };

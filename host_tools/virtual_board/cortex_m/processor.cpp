@@ -146,7 +146,7 @@ void Processor::execute() {
   const StoresBesideCode::Running running(stores_);
   const uc_err error = uc_emu_start(engine_.handle(), pc_ | 1U, 0, 0, 0);
   pc_ = engine_.get(UC_ARM_REG_PC);
-  if (problem_of_event_) std::rethrow_exception(std::exchange(problem_of_event_, nullptr));
+  if (problem_) std::rethrow_exception(std::exchange(problem_, nullptr));
   after_execution(error);
 }
 

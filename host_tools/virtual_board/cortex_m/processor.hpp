@@ -6,6 +6,7 @@
 #include <exception>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "host_tools/virtual_board/board_time.hpp"
 #include "host_tools/virtual_board/bus.hpp"
@@ -99,8 +100,9 @@ class Processor {
   /// Time and counters go on. Throws std::runtime_error when the flash holds no vector table.
   void reset(BoardTime now);
 
-  /// Runs until `limit` is reached or something else ends the run. What is due of the schedule before is
-  /// done at the next block's begin. What it throws ends the run and is thrown here.
+  /// Runs until `limit` is reached or something else ends the run. What falls due before then is
+  /// done at the beginning of the next block, or before a register is accessed. What is thrown at the
+  /// beginning of a block ends the run and is thrown here; what is thrown before an access refuses it.
   RunEnd run_until(BoardTime limit);
   /// While sleeping: lets the time pass without executing.
   void sleep_until(BoardTime time);
@@ -161,7 +163,9 @@ class Processor {
   void add_hooks();
   void begin_block(std::uint32_t address, std::uint32_t size);
   void note_code_in_ram(std::uint32_t address);
-  bool must_stop();
+  bool run_is_over() const;
+  bool must_stop_after_events();
+  void end_with(std::exception_ptr problem);
   void charge(std::uint64_t cycles);
   BoardTime next_limit() const {
     return schedule_.next_event ? std::min(run_limit_, schedule_.next_event()) : run_limit_;
@@ -212,7 +216,7 @@ class Processor {
 
   BoardTime now_ = 0;
   BoardTime run_limit_ = 0;  ///< what run_until() was asked for
-  BoardTime limit_ = 0;      ///< that, or the next event if it is earlier
+  BoardTime limit_ = 0;      ///< that, or the next event if it is earlier and already known
   std::uint64_t instructions_ = 0;
   std::uint64_t cycles_ = 0;
   BoardTime slept_ = 0;
@@ -239,7 +243,7 @@ class Processor {
   std::uint32_t access_pc_ = 0;        ///< instruction of the latest register access
   BadAccess bad_access_;
   bool bad_access_pending_ = false;
-  std::exception_ptr problem_of_event_;
+  std::exception_ptr problem_;  ///< thrown where the engine called, to be thrown behind it
   std::string fault_;
 };
 

@@ -29,7 +29,12 @@ constexpr const char* forbidden_words = "the memory protection forbids it";
 
 struct ProcessorHooks {
   static void block(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
-    static_cast<Processor*>(self)->begin_block(static_cast<std::uint32_t>(address), size);
+    auto& processor = *static_cast<Processor*>(self);
+    try {
+      processor.begin_block(static_cast<std::uint32_t>(address), size);
+    } catch (...) {
+      processor.end_with(std::current_exception());
+    }
   }
   static void access(uc_engine* /*engine*/, uc_mem_type /*type*/, std::uint64_t address, int /*bytes*/,
                      std::int64_t /*value*/, void* self) {
@@ -180,7 +185,7 @@ void Processor::begin_block(std::uint32_t address, std::uint32_t size) {
   }
   const bool interesting = attention_ || now_ >= limit_ || core_.exceptions.preempting() ||
                            stop_requested_.load(std::memory_order_relaxed);
-  if (interesting && !inside_if_then && must_stop()) {
+  if (interesting && !inside_if_then && must_stop_after_events()) {
     event_ = Event::block_end;
     uc_emu_stop(engine_.handle());
     return;
@@ -226,26 +231,32 @@ void Processor::note_code_in_ram(std::uint32_t address) {
   stores_.note_code_in_ram();
 }
 
-/// Something is up: find out what. Takes the limit again when registers were accessed, and lets the
-/// peripherals do what is due: to leave the engine for each of their events would take longer than most.
-bool Processor::must_stop() {
-  if (attention_) limit_ = next_limit();
-  if (now_ >= limit_ && now_ < run_limit_) {
-    attention_ = true;
-    try {
-      limit_ = std::min(run_limit_, schedule_.catch_up(now_));
-    } catch (...) {
-      problem_of_event_ = std::current_exception();
-      return true;
-    }
-  }
+/// What the engine has to be left for at once, before any event.
+bool Processor::run_is_over() const {
+  return faulted_ || bad_access_pending_ || core_.system_control.reset_requested() || !rights_are_applied();
+}
+
+/// Something is up: find out what, and whether the engine has to be left for it. Takes the limit again when
+/// registers were accessed, and lets the peripherals do what is due: to leave the engine for each of their
+/// events would take longer than most of them.
+bool Processor::must_stop_after_events() {
   if (attention_) {
     attention_ = false;
-    if (faulted_ || bad_access_pending_ || core_.system_control.reset_requested() || !rights_are_applied())
-      return true;
+    limit_ = next_limit();
+    if (run_is_over()) return true;
+  }
+  if (now_ >= limit_ && now_ < run_limit_) {
+    limit_ = std::min(run_limit_, schedule_.catch_up(now_));
+    if (run_is_over()) return true;
   }
   if (stop_requested_.load(std::memory_order_relaxed) || now_ >= limit_) return true;
   return core_.exceptions.preempting() && core_.exceptions.deliverable(masks());
+}
+
+void Processor::end_with(std::exception_ptr problem) {
+  problem_ = std::move(problem);
+  event_ = Event::block_end;
+  uc_emu_stop(engine_.handle());
 }
 
 /// Sets time and counters to the end of the accessing instruction, instead of its block.

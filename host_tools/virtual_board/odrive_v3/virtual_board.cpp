@@ -61,8 +61,8 @@ void VirtualBoard::attach_peripherals(const VirtualBoardConfig& config) {
                              Peripheral& block, std::size_t enable_register, std::uint32_t enable_mask) {
     std::function<bool()> clocked;
     if (enable_register != always) {
-      clocked = [&word = rcc_.enable_word(enable_register), enable_mask] {
-        return (word & enable_mask) == enable_mask;
+      clocked = [this, enable_register, enable_mask] {
+        return rcc_.clock_enabled(enable_register, enable_mask);
       };
     }
     bus_.attach(base, size, std::move(name), block, std::move(clocked));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <utility>
@@ -66,9 +67,11 @@ class RccModel final : public RegisterBlock<RccModel> {
   /// The reset flags stay: note_reset() sets them.
   void reset(BoardTime now) override;
 
-  /// What the enable register at `offset` holds, e.g. offsetof(RccRegisters, apb1enr); it stays where it is.
-  /// Throws std::out_of_range for any other register.
-  const std::uint32_t& enable_word(std::size_t offset) const;
+  /// Whether all bits of `mask` are set in the enable register at `offset`, e.g. offsetof(RccRegisters,
+  /// apb1enr). Throws std::out_of_range for any other register.
+  bool clock_enabled(std::size_t offset, std::uint32_t mask) const {
+    return (enable_word(offset) & mask) == mask;
+  }
   /// What the reset flags will say; call it with reset(). Also as after construction: power_on.
   void note_reset(drivers::stm32f4::ResetCause cause);
   /// The watchdog has started the low-speed oscillator.
@@ -99,6 +102,7 @@ class RccModel final : public RegisterBlock<RccModel> {
   bool usb_clock(BoardTime now) const;
 
  private:
+  const std::uint32_t& enable_word(std::size_t offset) const;
   static const RegisterTable<RccModel>& registers();
   std::uint32_t read_control(const Access& access) const { return cr_ | ready_flags(access.now); }
   std::uint32_t ready_flags(BoardTime now) const;

@@ -59,7 +59,7 @@ TEST(BlockTable, KeepsMoreBlocksThanHaveSlotsWhereTheyAre) {
   }
 }
 
-TEST(BlockTable, CountsAPageOfWhatThereIsMostOf) {
+TEST(BlockTable, AFullPageOverflowsNoCount) {
   BlockTable table;
   std::vector<std::uint8_t> page;
   for (int i = 0; i < 256; ++i) page.insert(page.end(), {0xB0, 0xEC, 0x20, 0x0A});  // vldmia r0!, {s0-s31}

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <cstddef>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "drivers/stm32f4/clock_tree.hpp"
@@ -182,6 +184,7 @@ TEST(RccEnables, OneBitOneClock) {
   EXPECT_FALSE(chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Uart4::mask));
   EXPECT_FALSE(
       chip.rcc.clock_enabled(offset, stm32::rcc_apb1enr::Usart2::mask | stm32::rcc_apb1enr::Uart4::mask));
+  EXPECT_THROW(chip.rcc.clock_enabled(offsetof(RccRegisters, cr), 1), std::out_of_range);
   EXPECT_NE(chip.refusal(offset, 1U << 11), "") << "WWDG is not on the board";
   EXPECT_NE(chip.refusal(offsetof(RccRegisters, ahb1enr), 1U << 21), "") << "DMA1";
   EXPECT_NE(chip.refusal(offsetof(RccRegisters, apb2rstr), 1U << 8), "") << "the converters";
