@@ -297,7 +297,8 @@ for (const [name, step] of chosen) {
     console.log(`ok ${name}`);
   } catch (error) {
     ++failed;
-    console.log(`FAILED ${name}: ${error.stack}\nstate: ${JSON.stringify(page.heard.state)}\nview: ${served.said}\ndevice: ${running.said}`);
+    const said = await page.evaluate(() => document.getElementById("said").textContent);
+    console.log(`FAILED ${name}: ${error.stack}\nstate: ${JSON.stringify(page.heard.state)}\npage: ${said}\nview: ${served.said}\ndevice: ${running.said}`);
     await page.screenshot({ path: join(tmpdir(), "kmax_view_failed.png") });
     break;  // the next step begins where this one should have ended
   }
