@@ -68,7 +68,11 @@ std::vector<std::uint32_t> CanLink::read(std::span<const std::size_t> slots) {
 std::uint32_t CanLink::read(std::size_t slot) {
   const Parameter parameter = Parameter::at(slot);
   const firmware::Entry& definition = parameter.definition();
-  keep_alive();
+  if (undisturbed_reads_ > 0) {
+    --undisturbed_reads_;
+  } else {
+    keep_alive();
+  }
   SdoClient::Bytes bytes;
   try {
     bytes = sdo_.upload(parameter.object());
@@ -94,12 +98,14 @@ void CanLink::write(std::span<const SlotValue> values, Repeat repeat,
     const std::string more =
         i == 0 ? "" : fmt::format("; {} of {} values had been written before", i, values.size());
     if (before_request) before_request();
+    undisturbed_reads_ = 0;
     try {
       claim(values[i], before_request);
       if (!gives_up(values[i])) keep_alive(before_request);
       sdo_.download(parameter.object(), bytes_of(values[i].raw, parameter.bytes()),
                     repeat == Repeat::if_lost);
     } catch (const SdoAborted& aborted) {
+      undisturbed_reads_ = 2;
       throw refusal(aborted, "write", name_of(parameter), more);
     } catch (const LinkError& error) {
       throw LinkError(error.what() + more);

@@ -30,7 +30,8 @@ class SdoRefused : public RefusedError {
 /// An axis that this program enables is its own (drive.commander): from that controlword on, until one that
 /// does not enable it, whatever is asked through this link also writes this program's link.sign_of_life
 /// twenty times a second, and no other program's traffic keeps the axis armed. Nothing is written before a
-/// controlword that takes the force.
+/// controlword that takes the force, nor before the two values that are read next after a refused write:
+/// refusal.reason and refusal.register are about the last write, and a sign of life is one.
 ///
 /// The node's SDO server is this program's alone (CanNodeLock), except while it waits.
 class CanLink final : public Link {
@@ -69,7 +70,8 @@ class CanLink final : public Link {
   SdoClient sdo_;
   std::array<bool, firmware::axis_count> commands_{};  ///< axes that this program has enabled
   Clock::time_point last_sign_of_life_{};
-  std::uint16_t number_;  ///< as a commander; not 0
+  int undisturbed_reads_ = 0;  ///< that may ask why a write was refused
+  std::uint16_t number_;       ///< as a commander; not 0
 };
 
 }  // namespace kmax::link

@@ -5,6 +5,7 @@
 
 #include <atomic>
 
+#include "firmware/canopen/sdo_frame.hpp"
 #include "firmware/capture/trace.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/base/errors.hpp"
@@ -212,6 +213,29 @@ TEST(CanLink, ItsCallerIsAskedBeforeEachRequestOfArming) {
   link.write({&enabling, 1}, Repeat::never, [&] { asked_after.push_back(answers); });
   ASSERT_EQ(answers, 3) << "commander, sign of life, controlword";
   EXPECT_EQ(asked_after, (std::vector{0, 1, 2}));
+}
+
+// What it was is kept by the device until the next write, and a sign of life is one.
+TEST(CanLink, NoSignOfLifeComesBetweenARefusedWriteAndTheQuestionWhy) {
+  std::atomic<int> signs = 0;
+  Bench bench([&](int, const CanFrame& answer) {
+    const Object sign = Parameter::of<"link.sign_of_life">().object();
+    if (firmware::canopen::sdo_address(answer.data) == sign) ++signs;
+    return Frames{answer};
+  });
+  CanLink& link = bench.link();
+  const SlotValue enabling{Parameter::of<"drive.controlword">(0).slot(), 15};
+  link.write({&enabling, 1}, Repeat::never);
+  const std::size_t report[] = {Parameter::of<"refusal.reason">().slot(),
+                                Parameter::of<"refusal.register">().slot()};
+  // Twenty a second: some would fall between.
+  while (signs < 10) {
+    EXPECT_THROW(write(link, {{damping.slot(), 0xBF800000}}), RefusedError);
+    const int before = signs;
+    link.read(report);
+    ASSERT_EQ(signs, before);
+    read(link, stiffness);
+  }
 }
 
 TEST(CanLink, AnotherDevicesObjectIsNotTakenForAValue) {
