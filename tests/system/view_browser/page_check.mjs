@@ -297,7 +297,7 @@ for (const [name, step] of chosen) {
     console.log(`ok ${name}`);
   } catch (error) {
     ++failed;
-    const said = await page.evaluate(() => document.getElementById("said").textContent);
+    const said = await page.evaluate(() => document.getElementById("said").textContent).catch((why) => why.message);
     console.log(`FAILED ${name}: ${error.stack}\nstate: ${JSON.stringify(page.heard.state)}\npage: ${said}\nview: ${served.said}\ndevice: ${running.said}`);
     await page.screenshot({ path: join(tmpdir(), "kmax_view_failed.png") });
     break;  // the next step begins where this one should have ended

@@ -229,7 +229,8 @@ TEST(CanLink, NoSignOfLifeComesBetweenARefusedWriteAndTheQuestionWhy) {
   const std::size_t report[] = {Parameter::of<"refusal.reason">().slot(),
                                 Parameter::of<"refusal.register">().slot()};
   // Twenty a second: some would fall between.
-  while (signs < 10) {
+  for (int round = 0; signs < 10; ++round) {
+    ASSERT_LT(round, 1'000'000) << "there are no signs of life";
     EXPECT_THROW(write(link, {{damping.slot(), 0xBF800000}}), RefusedError);
     const int before = signs;
     link.read(report);
