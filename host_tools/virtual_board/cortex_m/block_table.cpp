@@ -34,10 +34,10 @@ std::uint32_t first_floating_point(std::uint32_t address, std::span<const std::u
 }
 
 const Block* BlockTable::find_elsewhere(std::uint32_t address, std::uint32_t size, std::uint32_t& slot) {
-  const auto found = numbers_.find(key(address, size));
-  if (found == numbers_.end()) return nullptr;
+  const auto found = places_.find(key(address, size));
+  if (found == places_.end()) return nullptr;
   slot = found->second;
-  return &at(slot);
+  return &blocks_[slot];
 }
 
 const Block& BlockTable::add(std::uint32_t address, std::span<const std::uint8_t> code) {
@@ -72,11 +72,9 @@ const Block& BlockTable::add(std::uint32_t address, std::span<const std::uint8_t
   block.memory_instructions = (memory_.size() - block.first_memory_instruction) & 0x3FF;
   block.ends_inside_if_then = governed != 0 ? 1 : 0;
   block.endless = block.size == 2 && half_word(code, 0) == 0xE7FE ? 1 : 0;
-  if (++last_ % blocks_in_a_chunk == 0) chunks_.push_back(std::make_unique<Chunk>());
-  Block& added = (*chunks_.back())[last_ % blocks_in_a_chunk];
-  added = block;
-  numbers_[key(address, added.size)] = slots_[address / 2 % slot_count] = last_;
-  return added;
+  places_[key(address, block.size)] = slots_[address / 2 % slot_count] =
+      static_cast<std::uint32_t>(blocks_.size());
+  return blocks_.emplace_back(block);
 }
 
 }  // namespace kmax::virtual_board

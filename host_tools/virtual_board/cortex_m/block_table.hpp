@@ -1,9 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <deque>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -53,12 +52,12 @@ std::uint32_t first_floating_point(std::uint32_t address, std::span<const std::u
 
 class BlockTable {
  public:
-  BlockTable() : slots_(slot_count, 0) { chunks_.push_back(std::make_unique<Chunk>()); }
+  BlockTable() : slots_(slot_count, 0), blocks_(1) {}
 
   /// None when the block was not met before. A block stays where it is.
   const Block* find(std::uint32_t address, std::uint32_t size) {
     std::uint32_t& slot = slots_[address / 2 % slot_count];
-    const Block& block = at(slot);
+    const Block& block = blocks_[slot];
     if (block.address == address && block.size == size && slot != 0) return &block;
     return find_elsewhere(address, size, slot);
   }
@@ -72,21 +71,16 @@ class BlockTable {
   }
 
  private:
-  static constexpr std::size_t slot_count = 1U << 16, blocks_in_a_chunk = 1024;
-  using Chunk = std::array<Block, blocks_in_a_chunk>;
+  static constexpr std::size_t slot_count = 1U << 16;
   static std::uint64_t key(std::uint32_t address, std::uint32_t size) {
     return std::uint64_t{size} << 32 | address;
   }
-  const Block& at(std::uint32_t number) const {
-    return (*chunks_[number / blocks_in_a_chunk])[number % blocks_in_a_chunk];
-  }
   const Block* find_elsewhere(std::uint32_t address, std::uint32_t size, std::uint32_t& slot);
 
-  std::vector<std::uint32_t> slots_;            ///< numbers of blocks; 0: none
-  std::vector<std::unique_ptr<Chunk>> chunks_;  ///< by number
-  std::uint32_t last_ = 0;                      ///< number of the newest block
-  std::vector<MemoryInstruction> memory_;       ///< of all blocks, one behind the other
-  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
+  std::vector<std::uint32_t> slots_;       ///< places in blocks_; 0: none
+  std::deque<Block> blocks_;               ///< behind one that stands for none
+  std::vector<MemoryInstruction> memory_;  ///< of all blocks, one behind the other
+  std::unordered_map<std::uint64_t, std::uint32_t> places_;
 };
 
 /// Finds out which instruction of a block makes an access. The emulator tells address and direction of an
