@@ -23,19 +23,15 @@ std::int64_t counts(double position, double per_metre) {
 /// The judged window while it passes.
 class WindowJudge {
  public:
-  WindowJudge(double begin, double end, bool by_force, const TouchSetup& setup)
-      : begin_(begin),
-        quarter_length_((end - begin) / 4.0),
-        by_force_(by_force),
-        threshold_(by_force ? setup.force_threshold : setup.threshold),
-        setup_(setup) {
+  WindowJudge(double begin, double end, const TouchJudgement& judgement, const TouchSetup& setup)
+      : begin_(begin), quarter_length_((end - begin) / 4.0), judgement_(judgement), setup_(setup) {
     low_.fill(std::numeric_limits<double>::infinity());
     high_.fill(-std::numeric_limits<double>::infinity());
   }
 
   void take(double time, double position, double force) {
     if (time < begin_) return;
-    const double judged = by_force_ ? force : position;
+    const double judged = judgement_.by_force ? force : position;
     const auto quarter =
         std::min<std::size_t>(3, static_cast<std::size_t>((time - begin_) / quarter_length_));
     if (quarter > quarter_) close_quarters(quarter);
@@ -54,7 +50,7 @@ class WindowJudge {
     outcome.peak_to_peak = std::max(
         0.0, *std::max_element(high_.begin(), high_.end()) - *std::min_element(low_.begin(), low_.end()));
     outcome.deepest = deepest_;
-    outcome.by_force = by_force_;
+    outcome.by_force = judgement_.by_force;
     if (!touched_) {
       outcome.verdict = simulation::ContactVerdict::no_contact;
     } else {
@@ -64,12 +60,12 @@ class WindowJudge {
 
  private:
   void close_quarters(std::size_t next) {
-    for (; quarter_ < next; ++quarter_) still_ = still_ || !(high_[quarter_] - low_[quarter_] > threshold_);
+    for (; quarter_ < next; ++quarter_)
+      still_ = still_ || !(high_[quarter_] - low_[quarter_] > judgement_.threshold);
   }
 
   double begin_, quarter_length_;
-  bool by_force_;
-  double threshold_;
+  TouchJudgement judgement_;
   const TouchSetup& setup_;
   std::array<double, 4> low_{}, high_{};
   std::size_t quarter_ = 0;
@@ -77,7 +73,7 @@ class WindowJudge {
   bool touched_ = false, still_ = false;
 };
 
-void require(const TouchSetup& setup) {
+void require(const TouchSetup& setup, std::span<const TouchJudgement> judgements) {
   const double rate = setup.wall.tick_rate;
   if (setup.wall.divider != 1 || !(rate >= 10.0 && rate <= 1e6))
     throw std::invalid_argument(
@@ -90,10 +86,11 @@ void require(const TouchSetup& setup) {
   if (setup.window * rate < 8.0)
     throw std::invalid_argument(fmt::format(
         "judged window of {} s holds fewer than 8 samples at {} Hz: judge longer", setup.window, rate));
-  if (!(setup.threshold > 0.0) || !(setup.force_threshold >= 0.0))
-    throw std::invalid_argument(fmt::format(
-        "threshold of {} m or {} N peak to peak: the first must be above 0, the second 0 (not used) or above",
-        setup.threshold, setup.force_threshold));
+  for (const TouchJudgement& judgement : judgements) {
+    if (!(judgement.threshold > 0.0))
+      throw std::invalid_argument(fmt::format("threshold of {} {} peak to peak: it must be above 0",
+                                              judgement.threshold, judgement.by_force ? "N" : "m"));
+  }
   if (!(setup.wall.count_length > 0.0) || setup.wall.count_length > 1.0)
     throw std::invalid_argument(
         fmt::format("count length {} m: allowed is above 0 to 1 m", setup.wall.count_length));
@@ -120,8 +117,18 @@ control::HapticLoopConfig<float> touched_wall(double rate, double count_length, 
   return wall;
 }
 
-TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* recording) {
-  require(setup);
+namespace {
+
+/// How long a touch goes on.
+enum class Until : std::uint8_t {
+  each_is_certain,  ///< each criterion for itself: what follows is no part of its outcome
+  all_are_certain,
+  end_of_hold,
+};
+
+std::vector<TouchOutcome> run_touch(const TouchSetup& setup, std::span<const TouchJudgement> judgements,
+                                    Until until, std::vector<TouchSample>* recording) {
+  require(setup, judgements);
   simulation::CoupledHandle handle(setup.device, setup.person, setup.motion);
   handle.set_integrator(setup.integrator);
   if (setup.matrices) handle.share(setup.matrices);
@@ -134,18 +141,25 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   Loop loop;
   const AddedForce added = setup.added_force ? setup.added_force(setup) : AddedForce{};
 
-  TouchOutcome outcome;
+  TouchOutcome touch;  // without a verdict
   const double period = 1.0 / setup.wall.tick_rate;
   std::uint64_t saturated = 0, since_contact = 0;
-  std::optional<WindowJudge> judge, second;
+  std::vector<WindowJudge> judges;
+  std::vector<std::optional<TouchOutcome>> outcomes(judgements.size());
+  const auto finish = [&](std::size_t n) {
+    touch.event_limit_hits = handle.event_limit_hits();
+    if (since_contact > 0)
+      touch.saturated_share = static_cast<double>(saturated) / static_cast<double>(since_contact);
+    outcomes[n] = touch;
+    judges[n].finish(*outcomes[n]);
+  };
   double end = std::numeric_limits<double>::infinity();
-  for (;; ++outcome.samples) {
+  for (;; ++touch.samples) {
     const double time = handle.motion().elapsed();
-    if (!judge && handle.motion().hold_end()) {
+    if (judges.empty() && handle.motion().hold_end()) {
       end = *handle.motion().hold_end();
-      const bool by_force = setup.force_threshold > 0.0;
-      judge.emplace(end - setup.window, end, by_force && !setup.judges_both, setup);
-      if (by_force && setup.judges_both) second.emplace(end - setup.window, end, true, setup);
+      for (const TouchJudgement& judgement : judgements)
+        judges.emplace_back(end - setup.window, end, judgement, setup);
     }
     if (time >= end - 1e-9) break;
     const double position = handle.position();
@@ -155,15 +169,21 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     const Resisted resisted = resisted_force(loop, coefficients);
     handle.resist_across(resisted.across);
     if (out.inside && since_contact == 0) {
-      outcome.contact_speed = -setup.motion.wall_side * handle.velocity();
-      outcome.coefficient_at_contact = static_cast<double>(out.magnetic_coefficient);
+      touch.contact_speed = -setup.motion.wall_side * handle.velocity();
+      touch.coefficient_at_contact = static_cast<double>(out.magnetic_coefficient);
     }
     const auto force = static_cast<double>(out.force);
-    if (judge) {
-      judge->take(time, position, force);
-      if (second) second->take(time, position, force);
-      if (recording == nullptr && judge->certain() && (!second || second->certain())) break;
+    bool all_certain = !judges.empty();
+    for (std::size_t n = 0; n < judges.size(); ++n) {
+      if (outcomes[n]) continue;
+      judges[n].take(time, position, force);
+      if (!judges[n].certain()) {
+        all_certain = false;
+      } else if (until == Until::each_is_certain) {
+        finish(n);
+      }
     }
+    if (all_certain && until != Until::end_of_hold) break;
     if (recording != nullptr)
       recording->push_back({time, position, handle.velocity(), handle.hand_position(), force, resisted.along,
                             static_cast<double>(out.magnetic_coefficient)});
@@ -174,12 +194,32 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
     }
     handle.advance(force, resisted.along, period);
   }
-  judge->finish(outcome);
-  if (second && !outcome.unstable()) second->finish(outcome);
-  outcome.event_limit_hits = handle.event_limit_hits();
-  if (since_contact > 0)
-    outcome.saturated_share = static_cast<double>(saturated) / static_cast<double>(since_contact);
-  return outcome;
+  std::vector<TouchOutcome> all;
+  for (std::size_t n = 0; n < judges.size(); ++n) {
+    if (!outcomes[n]) finish(n);
+    all.push_back(*outcomes[n]);
+  }
+  return all;
+}
+
+}  // namespace
+
+TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* recording) {
+  if (!(setup.force_threshold >= 0.0))
+    throw std::invalid_argument(fmt::format(
+        "force threshold of {} N peak to peak: it must be 0 (not used) or above", setup.force_threshold));
+  const TouchJudgement moves{false, setup.threshold}, swings{true, setup.force_threshold};
+  std::vector<TouchJudgement> judgements;
+  const bool by_force = setup.force_threshold > 0.0;
+  if (!by_force || setup.judges_both) judgements.push_back(moves);
+  if (by_force) judgements.push_back(swings);
+  const std::vector<TouchOutcome> outcomes = run_touch(
+      setup, judgements, recording != nullptr ? Until::end_of_hold : Until::all_are_certain, recording);
+  return outcomes.front().unstable() ? outcomes.front() : outcomes.back();
+}
+
+std::vector<TouchOutcome> judge_touch(const TouchSetup& setup, std::span<const TouchJudgement> judgements) {
+  return run_touch(setup, judgements, Until::each_is_certain, nullptr);
 }
 
 }  // namespace kmax::experiment

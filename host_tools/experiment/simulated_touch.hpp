@@ -16,6 +16,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "control/haptic_loop.hpp"
@@ -93,5 +94,16 @@ struct TouchOutcome {
 // `recording`: every sample is appended, and the touch is simulated to the end of its hold. Throws
 // std::invalid_argument for models or settings out of range.
 TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* recording = nullptr);
+
+// One criterion: the position, m peak to peak, or the force asked for, N peak to peak.
+struct TouchJudgement {
+  bool by_force = false;
+  double threshold = 0.165e-3;
+};
+
+// One touch judged by several criteria, each by itself: to the last bit what simulate_touch() gives with each
+// of them alone, in their order, for the cost of the one that is certain last. The setup's own criteria are
+// not used. Throws as simulate_touch() does.
+std::vector<TouchOutcome> judge_touch(const TouchSetup& setup, std::span<const TouchJudgement> judgements);
 
 }  // namespace kmax::experiment

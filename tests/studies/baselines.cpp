@@ -166,15 +166,14 @@ std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vect
                                           const StiffnessRun& run) {
   std::vector<WallChange> walls;
   for (const Baseline& law : laws) walls.push_back(law.wall);
-  StiffnessRun felt = run, more = run;
-  felt.protocol.force_threshold = felt_force;
-  more.protocol.phases = 4;
-  const std::vector<PeopleMean> moves = sweep(set, walls, run), feels = sweep(set, walls, felt),
-                                phases = sweep(set, walls, more);
+  std::vector<TouchProtocol> protocols = by_both(run);
+  protocols.push_back(run.protocol);
+  protocols.back().phases = 4;
+  const auto found = sweep(set, walls, protocols, run);
   std::vector<BaselineResult> results;
   for (std::size_t n = 0; n < laws.size(); ++n)
     results.push_back(
-        {laws[n], moves[n], phases[n], feels[n], price_of(set, laws[n].wall, priced_stiffness)});
+        {laws[n], found[0][n], found[2][n], found[1][n], price_of(set, laws[n].wall, priced_stiffness)});
   return results;
 }
 

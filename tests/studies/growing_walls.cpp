@@ -64,15 +64,13 @@ std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const Stiffn
         law.wall(setup);
         situation.change(setup);
       });
-  StiffnessRun feeling = run;
-  feeling.protocol.force_threshold = felt_force;
-  const std::vector<PeopleMean> moves = sweep(set, walls, run), feels = sweep(set, walls, feeling);
+  const std::vector<TwoMeans> found = sweep_by_both(set, walls, run);
   std::vector<GrowingResult> results;
   std::size_t next = 0;
   for (const Baseline& law : laws) {
     results.push_back({law.name, {}});
     for (std::size_t n = 0; n < situations.size(); ++n, ++next)
-      results.back().situations.push_back({moves[next], feels[next]});
+      results.back().situations.push_back(found[next]);
   }
   return results;
 }
@@ -89,12 +87,12 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       {}};
   for (const LoopSetting& situation : growing_situations()) table.columns.push_back(situation.name);
   const auto best = std::max_element(walls.begin(), walls.end(), [](const auto& one, const auto& other) {
-    return one.situations.front().least() < other.situations.front().least();
+    return one.situations.front().both.mean < other.situations.front().both.mean;
   });
   for (const GrowingResult& wall : walls) {
     table.rows.push_back({wall.wall});
     for (std::size_t n = 0; n < wall.situations.size(); ++n) {
-      const double found = wall.situations[n].least(), plain = walls.front().situations[n].least();
+      const double found = wall.situations[n].both.mean, plain = walls.front().situations[n].both.mean;
       table.rows.back().push_back(
           fmt::format("{} ({:.1f})", n_per_mm(found), plain > 0.0 ? found / plain : 0.0));
     }
@@ -106,8 +104,8 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       "is slower than wall.calm_velocity (0.01 m/s). Its damper takes the difference over one sample "
       "(wall.damping_window = 1). No field, so nothing is felt at rest in front of it.",
       fmt::format("Best where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
-                  best->wall, n_per_mm(best->situations.front().least()),
-                  best->situations.front().least() / walls.front().situations.front().least()),
+                  best->wall, n_per_mm(best->situations.front().both.mean),
+                  best->situations.front().both.mean / walls.front().situations.front().both.mean),
       "It is paid for at the contact: a tap meets the touch stiffness and the damper, and the stiffness "
       "comes "
       "within three growth times. The rate-hardness above says how hard the contact itself is."};
@@ -145,29 +143,29 @@ std::vector<DrawnResult> run_drawn_devices(const SubjectSet& set, const std::vec
                                            const GrowthRule& rule, const StiffnessRun& run) {
   StiffnessRun moving = run;
   moving.steps = {.first = 100.0, .step = 10.0, .growth = 0.03, .last = 200e3};
-  StiffnessRun feeling = moving;
-  feeling.protocol.force_threshold = felt_force;
   const auto setup_of = [&](const DrawnDevice& drawn_device) {
     return experiment::touch_setup(drawn_device.device, set.subjects[drawn_device.person].person, {});
   };
-  const auto largest = [&](const std::function<WallChange(std::size_t)>& wall, const StiffnessRun& judged) {
-    std::vector<experiment::StiffnessJob> jobs;
+  const auto largest = [&](const std::function<WallChange(std::size_t)>& wall) {
+    std::vector<TouchSetup> setups;
     for (std::size_t n = 0; n < devices.size(); ++n) {
-      jobs.push_back({"", setup_of(devices[n])});
-      jobs.back().setup.wall.force.limit = static_cast<float>(devices[n].device.force_limit);
-      wall(n)(jobs.back().setup);
+      setups.push_back(setup_of(devices[n]));
+      setups.back().wall.force.limit = static_cast<float>(devices[n].device.force_limit);
+      wall(n)(setups.back());
     }
-    return experiment::run_stiffness_jobs(jobs, judged);
+    return search_by_each(setups, by_both(moving), moving);
   };
   const auto plain = [](std::size_t) -> WallChange { return [](TouchSetup&) {}; };
-  const auto plain_moves = largest(plain, moving), plain_feels = largest(plain, feeling);
+  const auto found = largest(plain);
+  const std::vector<MaxStiffness>&plain_moves = found[0], &plain_feels = found[1];
   const auto grown = [&](std::size_t n) {
     const double touch = rule.touch_share * std::min(plain_moves[n].stiffness, plain_feels[n].stiffness);
     // m / T
     const double most = devices[n].mass() * setup_of(devices[n]).wall.tick_rate;
     return growing(touch, rule.growth_time, rule.damping_share * most);
   };
-  const auto growing_moves = largest(grown, moving), growing_feels = largest(grown, feeling);
+  const auto of_grown = largest(grown);
+  const std::vector<MaxStiffness>&growing_moves = of_grown[0], &growing_feels = of_grown[1];
   std::vector<DrawnResult> results;
   for (std::size_t n = 0; n < devices.size(); ++n) {
     DrawnResult result{devices[n],

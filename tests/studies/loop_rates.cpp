@@ -24,12 +24,12 @@ TouchSetup setup_of(const RateCase& setting, const simulation::DeviceModel& devi
   return setup;
 }
 
-/// Of one encoder and measure, in their order: each loop's name with its results.
+/// Of one encoder, in their order: each loop's name with its results.
 using ByName = std::vector<std::pair<std::string, std::vector<const RateResult*>>>;
-ByName by_name(const std::vector<RateResult>& results, double count_length, RateMeasure measure) {
+ByName by_name(const std::vector<RateResult>& results, double count_length) {
   ByName loops;
   for (const RateResult& result : results) {
-    if (result.setting.count_length != count_length || result.setting.measure != measure) continue;
+    if (result.setting.count_length != count_length) continue;
     const std::string name = result.setting.name();
     auto loop = std::find_if(loops.begin(), loops.end(), [&](const auto& one) { return one.first == name; });
     if (loop == loops.end()) loop = loops.insert(loop, {name, {}});
@@ -48,10 +48,10 @@ std::string RateCase::name() const {
   return "no damping";
 }
 
-std::vector<RateCase> rate_cases(double count_length, RateMeasure measure) {
+std::vector<RateCase> rate_cases(double count_length) {
   std::vector<RateCase> cases;
   for (const double rate : study_rates) {
-    const RateCase plain{.rate = rate, .count_length = count_length, .measure = measure};
+    const RateCase plain{.rate = rate, .count_length = count_length};
     cases.insert(cases.end(), 3, plain);
     cases.end()[-2].delay_samples = 1.0;
     cases.end()[-1].delay = 0.5e-3;
@@ -71,15 +71,12 @@ std::vector<RateResult> run_rates(const std::vector<RateCase>& cases, const simu
       cases.size(), run.threads,
       [&](std::size_t index) {
         const RateCase& setting = cases[index];
-        experiment::TouchProtocol protocol = run.protocol;
-        if (setting.measure == RateMeasure::moves) {
-          protocol.threshold = 3.0 * setting.count_length;
-        } else {
-          protocol.force_threshold = felt_force;
-        }
-        return RateResult{setting, experiment::search_max_stiffness(
-                                       setup_of(setting, device), protocol,
-                                       {.first = 100.0, .step = 10.0, .growth = 0.03, .last = 1e6})};
+        std::vector<TouchProtocol> protocols = by_both(run);
+        protocols.front().threshold = 3.0 * setting.count_length;
+        const std::vector<MaxStiffness> found = experiment::search_max_stiffness_by_each(
+            setup_of(setting, device), protocols,
+            {.first = 100.0, .step = 10.0, .growth = 0.03, .last = 1e6});
+        return RateResult{setting, found[0], found[1]};
       },
       run.progress);
 }
@@ -102,19 +99,22 @@ report::Section rate_section(const std::vector<RateResult>& results) {
                           {"loop"},
                           {}};
       for (const double rate : study_rates) table.columns.push_back(fmt::format("{:g} Hz", rate));
-      for (const auto& [name, found] : by_name(results, encoder, measure)) {
+      for (const auto& [name, found] : by_name(results, encoder)) {
         table.rows.push_back({name});
         for (const double rate : study_rates) {
           const auto at = std::find_if(found.begin(), found.end(), [&](const RateResult* result) {
             return result->setting.rate == rate;
           });
-          table.rows.back().push_back(at == found.end()
-                                          ? "-"
-                                          : fmt::format("{}{:.3g}", (*at)->found.beyond_last ? ">" : "",
-                                                        (*at)->found.stiffness / 1e3));
+          if (at == found.end()) {
+            table.rows.back().push_back("-");
+            continue;
+          }
+          const MaxStiffness& largest = (*at)->by(measure);
+          table.rows.back().push_back(
+              fmt::format("{}{:.3g}", largest.beyond_last ? ">" : "", largest.stiffness / 1e3));
         }
       }
-      if (!table.rows.empty()) section.tables.push_back(std::move(table));
+      section.tables.push_back(std::move(table));
     }
   }
   return section;
@@ -129,11 +129,11 @@ report::Picture draw_rates(const std::vector<RateResult>& results, double count_
   figure.log_x = figure.legend_beside = true;
   plot::Panel panel{"largest stable stiffness (N/mm)", {}, {}};
   panel.log_y = true;
-  for (const auto& [name, found] : by_name(results, count_length, measure)) {
+  for (const auto& [name, found] : by_name(results, count_length)) {
     plot::Series series{name, {}, {}, false, true};
     for (const RateResult* result : found) {
       series.x.push_back(result->setting.rate);
-      series.y.push_back(result->found.stiffness / 1e3);
+      series.y.push_back(result->by(measure).stiffness / 1e3);
     }
     panel.series.push_back(std::move(series));
   }
@@ -148,10 +148,8 @@ std::vector<report::Section> loop_rates(const StudyInput& input) {
   run.protocol.pushes = {0.6};
   std::vector<RateCase> cases;
   for (const double count_length : {55e-6, 5.5e-6}) {
-    for (const RateMeasure measure : {RateMeasure::moves, RateMeasure::feels}) {
-      const std::vector<RateCase> more = rate_cases(count_length, measure);
-      cases.insert(cases.end(), more.begin(), more.end());
-    }
+    const std::vector<RateCase> more = rate_cases(count_length);
+    cases.insert(cases.end(), more.begin(), more.end());
   }
   const std::vector<RateResult> results = run_rates(cases, input.sets.front().device, run);
   report::Section section = rate_section(results);

@@ -27,9 +27,11 @@
 namespace kmax::studies {
 
 using experiment::CountedEnds;
+using experiment::MaxStiffness;
 using experiment::StiffnessCondition;
 using experiment::StiffnessRun;
 using experiment::SubjectSet;
+using experiment::TouchProtocol;
 using experiment::TouchSetup;
 
 struct StudyInput {
@@ -102,6 +104,24 @@ struct PeopleMean {
 using WallChange = std::function<void(TouchSetup&)>;
 std::vector<PeopleMean> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
                               const StiffnessRun& run);
+/// By each of several protocols, which are searched at once and take the place of the run's:
+/// experiment::search_max_stiffness_by_each() says which may be.
+std::vector<std::vector<PeopleMean>> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
+                                           const std::vector<TouchProtocol>& protocols,
+                                           const StiffnessRun& run);
+/// Likewise of any touches, [protocol][setup].
+std::vector<std::vector<MaxStiffness>> search_by_each(const std::vector<TouchSetup>& setups,
+                                                      const std::vector<TouchProtocol>& protocols,
+                                                      const StiffnessRun& run);
+/// By the position, by the force, and by both: the mean of what each of the people can have by the criterion
+/// that gives it less.
+struct TwoMeans {
+  PeopleMean moves{}, feels{}, both{};
+};
+std::vector<TwoMeans> sweep_by_both(const SubjectSet& set, const std::vector<WallChange>& walls,
+                                    const StiffnessRun& run);
+/// By the position as the run has it, and by the force that people feel.
+std::vector<TouchProtocol> by_both(const StiffnessRun& run);
 
 // --- Figs. 9 to 12 of paper 1: one stiffness held under every law (held_walls.cpp) -------------------------
 
@@ -176,18 +196,16 @@ struct Variation {
   std::string group;  ///< what is varied
   bool refit = false;
   SubjectSet set;
-  experiment::TouchProtocol protocol;
+  TouchProtocol protocol;
   simulation::IntegratorConfig integrator{};
 };
 using simulation::bend;
 /// From a calibrated set: all but the two below.
-std::vector<Variation> assumption_variations(const SubjectSet& set,
-                                             const experiment::TouchProtocol& protocol);
+std::vector<Variation> assumption_variations(const SubjectSet& set, const TouchProtocol& protocol);
 /// A structure that bends, and more phases of a touch.
-std::vector<Variation> compliance_variations(const SubjectSet& set,
-                                             const experiment::TouchProtocol& protocol);
+std::vector<Variation> compliance_variations(const SubjectSet& set, const TouchProtocol& protocol);
 /// Other people: the seeds 1 to `groups`, each fitted again.
-std::vector<Variation> draw_variations(const SubjectSet& set, const experiment::TouchProtocol& protocol,
+std::vector<Variation> draw_variations(const SubjectSet& set, const TouchProtocol& protocol,
                                        std::size_t groups);
 
 struct VariationResult {
@@ -302,11 +320,6 @@ struct LoopSetting {
 std::vector<LoopSetting> loop_settings();
 inline constexpr std::array map_dampings{2.0, 4.0, 8.0, 12.0, 24.0};  ///< N s/m
 
-/// By the position and by the force.
-struct TwoMeans {
-  PeopleMean moves, feels;
-  double least() const { return std::min(moves.mean, feels.mean); }  ///< N/m: stable by both
-};
 struct DampingMap {
   LoopSetting setting;
   std::array<TwoMeans, 3> laws;  ///< plain_wall(), field_of_two(), adaptive_as_printed()
@@ -379,17 +392,17 @@ struct RateCase {
   control::VelocityEstimatorKind estimator = control::VelocityEstimatorKind::difference;
   double delay_samples = 0.0;  ///< from the sample to its force
   double delay = 0.0;          ///< s, added to it
-  RateMeasure measure = RateMeasure::moves;
-  std::string name() const;  ///< without rate and encoder
+  std::string name() const;    ///< without rate and encoder
 };
 inline constexpr std::array study_rates{500.0, 1000.0, 2000.0, 5000.0, 10000.0, 20000.0};  ///< Hz
 /// Every rate with: no damping; a delay of one sample; a delay of 0.5 ms; damping of 2 N s/m with each
 /// estimator.
-std::vector<RateCase> rate_cases(double count_length, RateMeasure measure);
+std::vector<RateCase> rate_cases(double count_length);
 
 struct RateResult {
   RateCase setting;
-  experiment::MaxStiffness found;
+  MaxStiffness moves{}, feels{};
+  const MaxStiffness& by(RateMeasure measure) const { return measure == RateMeasure::moves ? moves : feels; }
 };
 /// The person of the supplied scenes; the force is not clipped, and the stiffness rises by 3 % a step, which
 /// is the resolution of the result. `device`: its force limit and delay are not used.

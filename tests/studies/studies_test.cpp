@@ -333,9 +333,10 @@ TEST(VariationSection, AMissedFitIsSaidAndNothingIsRobustWithIt) {
   EXPECT_EQ(missed.tables[0].rows[3][3], "missed: both");
   for (const std::string& words : missed.paragraphs)
     EXPECT_EQ(words.find("Robust: "), std::string::npos) << words;
-  EXPECT_TRUE(missed.paragraphs[0].starts_with("Not robust: ")) << missed.paragraphs[0];
+  EXPECT_TRUE(missed.paragraphs[0].starts_with("Holds where judged: ")) << missed.paragraphs[0];
   EXPECT_CONTAINS(missed.paragraphs[0], "(1 of 1; 3 whose fit missed its targets left out)");
-  EXPECT_TRUE(variation_section("x", {good, good, good, both}).paragraphs[0].starts_with("Mostly: "));
+  EXPECT_TRUE(
+      variation_section("x", {good, good, good, both}).paragraphs[0].starts_with("Holds where judged: "));
   EXPECT_TRUE(variation_section("x", {both}).paragraphs[0].starts_with("Not judged: "));
   EXPECT_NO_THROW(report::require_rectangular(missed.tables[0]));
 }
@@ -459,20 +460,44 @@ TEST(AdaptiveGapSection, MarksMeansThatHoldBounds) {
                   "latched at 0.05 m/s: 2 of 2; held for the whole touch at 0.05 m/s: 1 of 2");
 }
 
+// --- Both criteria at once --------------------------------------------------------------------------------
+
+TEST(SweepByBoth, TakesOfEachPersonTheCriterionThatGivesLess) {
+  const SubjectSet set = few_people(3);
+  StiffnessRun run = quick_run();
+  run.protocol.approach_speeds = {0.1, 0.5};
+  const WallChange damped_wall = damped(8.0, control::VelocityEstimatorKind::difference);
+  const std::vector<TwoMeans> found = sweep_by_both(set, {[](TouchSetup&) {}, damped_wall}, run);
+  ASSERT_EQ(found.size(), 2U);
+  double least = 0.0;
+  for (const experiment::Subject& subject : set.subjects) {
+    TouchSetup setup = experiment::touch_setup(set.device, subject.person, {});
+    damped_wall(setup);
+    double smaller = 1e9;
+    for (const TouchProtocol& protocol : by_both(run))
+      smaller = std::min(smaller, experiment::search_max_stiffness(setup, protocol, run.steps).stiffness);
+    least += smaller / 3.0;
+  }
+  EXPECT_NEAR(found[1].both.mean, least, 1e-9 * least);
+  EXPECT_LE(found[0].both.mean, std::min(found[0].moves.mean, found[0].feels.mean));
+  EXPECT_EQ(found[1].moves.mean, sweep(set, {damped_wall}, run).front().mean);
+}
+
 // --- Rates ------------------------------------------------------------------------------------------------
 
 TEST(LoopRates, AFasterLoopRendersAStifferWallAndADelayEatsIt) {
   const auto results =
       run_rates({{.rate = 500.0}, {.rate = 1000.0}, {.rate = 1000.0, .delay = 0.5e-3}}, {}, quick_run());
-  EXPECT_GT(results[1].found.stiffness, 1.5 * results[0].found.stiffness);
-  EXPECT_LT(results[2].found.stiffness, 0.7 * results[1].found.stiffness);
+  EXPECT_GT(results[1].moves.stiffness, 1.5 * results[0].moves.stiffness);
+  EXPECT_LT(results[2].moves.stiffness, 0.7 * results[1].moves.stiffness);
   // One count of 55 um is 1 N at 18 N/mm.
-  const auto felt = run_rates({{.rate = 5000.0, .measure = RateMeasure::feels}}, {}, quick_run());
-  EXPECT_LT(felt[0].found.stiffness, 1.04 / 55e-6);
+  const auto fast = run_rates({{.rate = 5000.0}}, {}, quick_run());
+  EXPECT_LT(fast[0].feels.stiffness, 1.04 / 55e-6);
+  EXPECT_GT(fast[0].moves.stiffness, fast[0].feels.stiffness);
 }
 
 TEST(LoopRates, NamesEveryCaseOfAnEncoderOnce) {
-  const auto cases = rate_cases(5.5e-6, RateMeasure::moves);
+  const auto cases = rate_cases(5.5e-6);
   EXPECT_EQ(cases.size(), study_rates.size() * 8);
   std::set<std::pair<double, std::string>> names;
   for (const RateCase& setting : cases)
@@ -482,21 +507,24 @@ TEST(LoopRates, NamesEveryCaseOfAnEncoderOnce) {
 
 TEST(RateSection, HasATableForEachEncoderAndMeasureAndGapsWhereNothingWasRun) {
   const host_tools_test::TemporaryFolder folder;
-  const RateResult known{{.rate = 1000.0, .count_length = 55e-6}, found_stiffness(7000.0)};
+  const RateResult known{
+      {.rate = 1000.0, .count_length = 55e-6}, found_stiffness(7000.0), found_stiffness(5000.0)};
   RateResult beyond = known, fine = known;
   beyond.setting.rate = 20e3;
-  beyond.found.stiffness = 40e3;
-  beyond.found.beyond_last = true;
+  beyond.moves.stiffness = 40e3;
+  beyond.moves.beyond_last = true;
   fine.setting.count_length = 5.5e-6;
-  fine.setting.measure = RateMeasure::feels;
   fine.setting.delay = 0.5e-3;
   const report::Section section = rate_section({fine, known, beyond});
-  ASSERT_EQ(section.tables.size(), 2U);
+  ASSERT_EQ(section.tables.size(), 4U);
   // The coarse encoder comes first.
   EXPECT_CONTAINS(section.tables[0].caption, "55 um, unstable: moves by 3 counts");
-  EXPECT_CONTAINS(section.tables[1].caption, "5.5 um, unstable: swings by 1 N");
+  EXPECT_CONTAINS(section.tables[1].caption, "55 um, unstable: swings by 1 N");
+  EXPECT_CONTAINS(section.tables[3].caption, "5.5 um, unstable: swings by 1 N");
   ASSERT_EQ(section.tables[0].rows.size(), 1U);
   EXPECT_EQ(section.tables[0].rows[0], (Row{"no damping", "-", "7", "-", "-", "-", ">40"}));
+  ASSERT_EQ(section.tables[1].rows.size(), 1U);
+  EXPECT_EQ(section.tables[1].rows[0], (Row{"no damping", "-", "5", "-", "-", "-", "5"}));
   for (const report::Table& table : section.tables) EXPECT_NO_THROW(report::require_rectangular(table));
   // A picture is of one encoder and measure.
   const auto picture = draw_rates({known, fine}, 55e-6, RateMeasure::moves, folder / "r.svg");

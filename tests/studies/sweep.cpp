@@ -11,24 +11,84 @@ std::string n_per_mm(double stiffness) {
   return fmt::format("{:.2f}", stiffness / 1e3);
 }
 
-std::vector<PeopleMean> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
-                              const StiffnessRun& run) {
-  std::vector<experiment::StiffnessJob> jobs;
+std::vector<TouchProtocol> by_both(const StiffnessRun& run) {
+  std::vector<TouchProtocol> protocols(2, run.protocol);
+  protocols.back().force_threshold = felt_force;
+  return protocols;
+}
+
+std::vector<std::vector<MaxStiffness>> search_by_each(const std::vector<TouchSetup>& setups,
+                                                      const std::vector<TouchProtocol>& protocols,
+                                                      const StiffnessRun& run) {
+  const auto of_setups = experiment::collect_jobs<std::vector<MaxStiffness>>(
+      setups.size(), run.threads,
+      [&](std::size_t index) {
+        TouchSetup setup = setups[index];
+        setup.integrator = run.integrator;
+        return experiment::search_max_stiffness_by_each(setup, protocols, run.steps);
+      },
+      run.progress);
+  std::vector<std::vector<MaxStiffness>> of_protocols(protocols.size());
+  for (const std::vector<MaxStiffness>& found : of_setups)
+    for (std::size_t n = 0; n < protocols.size(); ++n) of_protocols[n].push_back(found[n]);
+  return of_protocols;
+}
+
+namespace {
+
+/// Everybody's touch of each wall, [wall * people + person].
+std::vector<TouchSetup> setups_of(const SubjectSet& set, const std::vector<WallChange>& walls) {
+  std::vector<TouchSetup> setups;
   for (const WallChange& change : walls) {
     for (const experiment::Subject& subject : set.subjects) {
-      jobs.push_back({"", experiment::touch_setup(set.device, subject.person, {})});
-      change(jobs.back().setup);
+      setups.push_back(experiment::touch_setup(set.device, subject.person, {}));
+      change(setups.back());
     }
   }
-  const std::vector<experiment::MaxStiffness> found = experiment::run_stiffness_jobs(jobs, run);
-  std::vector<PeopleMean> means;
-  for (std::size_t wall = 0; wall < walls.size(); ++wall) {
-    const auto people = std::span(found).subspan(wall * set.subjects.size(), set.subjects.size());
-    means.push_back({experiment::mean_stiffness(people), experiment::counted_ends(people), 0.0});
-    for (const experiment::MaxStiffness& person : people)
-      means.back().saturated_share = std::max(means.back().saturated_share, person.saturated_share);
+  return setups;
+}
+
+PeopleMean mean_of(std::span<const MaxStiffness> people) {
+  PeopleMean mean{experiment::mean_stiffness(people), experiment::counted_ends(people), 0.0};
+  for (const MaxStiffness& person : people)
+    mean.saturated_share = std::max(mean.saturated_share, person.saturated_share);
+  return mean;
+}
+
+}  // namespace
+
+std::vector<std::vector<PeopleMean>> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
+                                           const std::vector<TouchProtocol>& protocols,
+                                           const StiffnessRun& run) {
+  std::vector<std::vector<PeopleMean>> means;
+  for (const std::vector<MaxStiffness>& found : search_by_each(setups_of(set, walls), protocols, run)) {
+    means.emplace_back();
+    for (std::size_t wall = 0; wall < walls.size(); ++wall)
+      means.back().push_back(
+          mean_of(std::span(found).subspan(wall * set.subjects.size(), set.subjects.size())));
   }
   return means;
+}
+
+std::vector<TwoMeans> sweep_by_both(const SubjectSet& set, const std::vector<WallChange>& walls,
+                                    const StiffnessRun& run) {
+  const auto found = search_by_each(setups_of(set, walls), by_both(run), run);
+  std::vector<MaxStiffness> smaller;
+  for (std::size_t n = 0; n < found[0].size(); ++n)
+    smaller.push_back(found[1][n].stiffness < found[0][n].stiffness ? found[1][n] : found[0][n]);
+  std::vector<TwoMeans> means;
+  for (std::size_t wall = 0; wall < walls.size(); ++wall) {
+    const auto mean = [&](const std::vector<MaxStiffness>& one) {
+      return mean_of(std::span(one).subspan(wall * set.subjects.size(), set.subjects.size()));
+    };
+    means.push_back({mean(found[0]), mean(found[1]), mean(smaller)});
+  }
+  return means;
+}
+
+std::vector<PeopleMean> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
+                              const StiffnessRun& run) {
+  return sweep(set, walls, {run.protocol}, run).front();
 }
 
 std::vector<report::Section> run_studies(const std::vector<std::string>& names, const StudyInput& input) {

@@ -88,11 +88,13 @@ std::string finding(const Claim& claim, const std::vector<VariationResult>& resu
     ++of;
     holds += claim.holds(constant, adaptive) ? 1 : 0;
   }
-  // Shares are of all: what a fit missed was not shown to hold.
+  // What a fit missed was not shown to hold: where all that is judged holds, that is said as no more than it
+  // is.
   const std::size_t all = results.size();
   const std::string_view word = of == 0                ? "Not judged"
                                 : holds == all         ? "Robust"
                                 : holds == 0           ? "Never"
+                                : holds == of          ? "Holds where judged"
                                 : 4 * holds >= 3 * all ? "Mostly"
                                                        : "Not robust";
   return fmt::format("{}: {} ({} of {}{}).", word, claim.words, holds, of,

@@ -22,74 +22,116 @@ void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
                     steps.first, first_adaptive, steps.step, steps.growth, steps.last));
 }
 
-/// Every touch of the protocol at one stiffness, up to the first one that is unstable.
+void require_shared_touches(std::span<const TouchProtocol> protocols) {
+  std::size_t phases = 1;
+  for (const TouchProtocol& protocol : protocols) phases = std::max(phases, protocol.phases);
+  for (const TouchProtocol& protocol : protocols) {
+    if (protocol.approach_speeds != protocols.front().approach_speeds ||
+        protocol.pushes != protocols.front().pushes || (protocol.phases != 1 && protocol.phases != phases))
+      throw std::invalid_argument(
+          fmt::format("protocols that are searched at once: allowed are equal speeds and pushes, and phases "
+                      "of 1 or of the largest number, {}; one has {}",
+                      phases, protocol.phases));
+  }
+}
+
+/// How far one protocol has come.
+struct Search {
+  const TouchProtocol& protocol;
+  MaxStiffness result{};
+  // At the present stiffness.
+  double saturated = 0.0;
+  bool touched = false, unstable = false;
+};
+
+/// Every touch of the protocols at one stiffness, of each up to the first one that is unstable by it.
 class TouchesOfStiffness {
  public:
-  TouchesOfStiffness(const TouchSetup& setup, const TouchProtocol& protocol)
-      : touch_(setup),
-        protocol_(protocol),
-        period_(1.0 / setup.wall.tick_rate),
-        start_position_(setup.motion.start_position) {
+  explicit TouchesOfStiffness(const TouchSetup& setup)
+      : touch_(setup), period_(1.0 / setup.wall.tick_rate), start_position_(setup.motion.start_position) {
     if (!touch_.matrices)
       touch_.matrices =
           std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, study_gain_bits);
-    touch_.threshold = protocol.threshold;
-    touch_.force_threshold = protocol.force_threshold;
   }
 
-  /// True: none was unstable, and `result` has this stiffness unless there was no touch.
-  bool stable(double stiffness, MaxStiffness& result) {
+  /// Leaves in each search whether it found this stiffness unstable; if not, and if there was a touch, its
+  /// result has this stiffness.
+  void touch(double stiffness, std::span<Search* const> searches) {
     touch_.wall.wall.stiffness = static_cast<float>(stiffness);
-    Found found;
-    for (const double speed : protocol_.approach_speeds) {
-      for (const double push : protocol_.pushes) {
-        for (std::size_t phase = 0; phase < protocol_.phases; ++phase) {
-          if (unstable(speed, push, phase, result, found)) return false;
+    std::size_t phases = 1;
+    for (Search* search : searches) {
+      search->saturated = 0.0;
+      search->touched = search->unstable = false;
+      phases = std::max(phases, search->protocol.phases);
+    }
+    const TouchProtocol& any = searches.front()->protocol;
+    for (const double speed : any.approach_speeds) {
+      for (const double push : any.pushes) {
+        for (std::size_t phase = 0; phase < phases; ++phase) {
+          begin_from(speed, static_cast<double>(phase) / static_cast<double>(phases));
+          touch_.motion.push_force = push;
+          judge(searches, phase);
         }
       }
     }
-    result.never_touched = !found.touched;
-    if (!found.touched) return true;
-    result.stiffness = stiffness;
-    result.saturated_share = found.saturated;
-    return true;
+    for (Search* search : searches) {
+      if (search->unstable) continue;
+      search->result.never_touched = !search->touched;
+      if (!search->touched) continue;
+      search->result.stiffness = stiffness;
+      search->result.saturated_share = search->saturated;
+    }
   }
 
  private:
-  struct Found {
-    double saturated = 0.0;
-    bool touched = false;
-  };
-
-  bool unstable(double speed, double push, std::size_t phase, MaxStiffness& result, Found& found) {
+  /// Further out by a share of a sample's way.
+  void begin_from(double speed, double share) {
     touch_.motion.approach_speed = speed;
-    touch_.motion.push_force = push;
-    const double share = static_cast<double>(phase) / static_cast<double>(protocol_.phases);
     touch_.motion.start_position = start_position_ + touch_.motion.wall_side * share * speed * period_;
-    const TouchOutcome outcome = simulate_touch(touch_);
+  }
+
+  void judge(std::span<Search* const> searches, std::size_t phase) {
+    asking_.clear();
+    judgements_.clear();
+    for (Search* search : searches) {
+      if (search->unstable || phase >= search->protocol.phases) continue;
+      asking_.push_back(search);
+      judgements_.push_back(search->protocol.judgement());
+    }
+    if (asking_.empty()) return;
+    const std::vector<TouchOutcome> outcomes = judge_touch(touch_, judgements_);
+    for (std::size_t n = 0; n < asking_.size(); ++n) take(outcomes[n], *asking_[n]);
+  }
+
+  void take(const TouchOutcome& outcome, Search& search) const {
+    MaxStiffness& result = search.result;
     ++result.touches;
     result.simulated_time += static_cast<double>(outcome.samples) * period_;
     result.event_limit_hits += outcome.event_limit_hits;
-    found.saturated = std::max(found.saturated, outcome.saturated_share);
-    found.touched = found.touched || outcome.verdict != simulation::ContactVerdict::no_contact;
-    if (!outcome.unstable()) return false;
-    result.ending_speed = speed;
-    result.ending_push = push;
+    search.saturated = std::max(search.saturated, outcome.saturated_share);
+    search.touched = search.touched || outcome.verdict != simulation::ContactVerdict::no_contact;
+    search.unstable = outcome.unstable();
+    if (!search.unstable) return;
+    result.ending_speed = touch_.motion.approach_speed;
+    result.ending_push = touch_.motion.push_force;
     result.ending_peak_to_peak = outcome.peak_to_peak;
-    return true;
   }
 
   TouchSetup touch_;
-  const TouchProtocol& protocol_;
   double period_, start_position_;
+  std::vector<Search*> asking_;
+  std::vector<TouchJudgement> judgements_;
 };
 
 /// Below a first stiffness that is unstable.
-void go_down(TouchesOfStiffness& touches, double first, double step, MaxStiffness& result) {
+void go_down(TouchesOfStiffness& touches, double first, double step, Search& search) {
+  Search* const alone[] = {&search};
   for (std::uint64_t n = 1;; ++n) {
     const double stiffness = first - step * static_cast<double>(n);
     // Of a step: what is left of it where the way down ends at 0.
-    if (stiffness < 1e-9 * step || touches.stable(stiffness, result)) break;
+    if (stiffness < 1e-9 * step) break;
+    touches.touch(stiffness, alone);
+    if (!search.unstable) break;
   }
 }
 
@@ -97,24 +139,37 @@ void go_down(TouchesOfStiffness& touches, double first, double step, MaxStiffnes
 
 MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& protocol,
                                   const StiffnessSteps& steps) {
-  require(protocol, steps);
-  MaxStiffness result;
-  TouchesOfStiffness touches(setup, protocol);
+  return search_max_stiffness_by_each(setup, std::span(&protocol, 1), steps).front();
+}
+
+std::vector<MaxStiffness> search_max_stiffness_by_each(const TouchSetup& setup,
+                                                       std::span<const TouchProtocol> protocols,
+                                                       const StiffnessSteps& steps) {
+  for (const TouchProtocol& protocol : protocols) require(protocol, steps);
+  require_shared_touches(protocols);
+  std::vector<Search> searches;
+  for (const TouchProtocol& protocol : protocols) searches.push_back({protocol});
+  std::vector<Search*> climbing;
+  for (Search& search : searches) climbing.push_back(&search);
+  TouchesOfStiffness touches(setup);
   const bool adaptive = control::follows_velocity(setup.wall.wall.kind);
   const double first = adaptive ? steps.first_adaptive.value_or(steps.first) : steps.first;
   // Counted in steps, so that thousands of them add no rounding.
   double stiffness = first;
-  for (std::uint64_t n = 1; stiffness <= steps.last * (1.0 + 1e-12); ++n) {
-    if (!touches.stable(stiffness, result)) {
-      if (n == 1 && steps.goes_down) go_down(touches, first, steps.step, result);
-      return result;
-    }
-    if (result.never_touched) return result;
+  for (std::uint64_t n = 1; !climbing.empty() && stiffness <= steps.last * (1.0 + 1e-12); ++n) {
+    touches.touch(stiffness, climbing);
+    std::erase_if(climbing, [&](Search* search) {
+      const bool ends = search->unstable || search->result.never_touched;
+      if (search->unstable && n == 1 && steps.goes_down) go_down(touches, first, steps.step, *search);
+      return ends;
+    });
     stiffness = steps.growth * stiffness > steps.step ? stiffness * (1.0 + steps.growth)
                                                       : first + steps.step * static_cast<double>(n);
   }
-  result.beyond_last = true;
-  return result;
+  for (Search* search : climbing) search->result.beyond_last = true;
+  std::vector<MaxStiffness> results;
+  for (const Search& search : searches) results.push_back(search.result);
+  return results;
 }
 
 }  // namespace kmax::experiment

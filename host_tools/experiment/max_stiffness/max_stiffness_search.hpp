@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "host_tools/experiment/simulated_touch.hpp"
@@ -23,6 +24,11 @@ struct TouchProtocol {
   double threshold = 0.165e-3;   // m peak to peak: contact_measure.hpp
   double force_threshold = 0.0;  // N: simulated_touch.hpp
   std::size_t touches() const { return approach_speeds.size() * pushes.size() * phases; }
+  // By the force if there is a threshold for it, else by the position.
+  TouchJudgement judgement() const {
+    const bool by_force = force_threshold > 0.0;
+    return {by_force, by_force ? force_threshold : threshold};
+  }
 };
 
 // The default begins far below the paper's 3.0 N/mm (5.0 for the adaptive wall): for a third of the simulated
@@ -54,5 +60,12 @@ struct MaxStiffness {
 // `setup`: everything but stiffness, approach speed, push and thresholds. Throws std::invalid_argument.
 MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& protocol,
                                   const StiffnessSteps& steps);
+
+// By several protocols at once, which differ in their thresholds, and in their phases as one and the largest
+// number of them do. In their order, each to the last bit what it gives alone; but a touch that several ask
+// for is simulated once, which is half of the time for the two criteria. Throws std::invalid_argument.
+std::vector<MaxStiffness> search_max_stiffness_by_each(const TouchSetup& setup,
+                                                       std::span<const TouchProtocol> protocols,
+                                                       const StiffnessSteps& steps);
 
 }  // namespace kmax::experiment

@@ -223,6 +223,7 @@ TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
   refused([](TouchSetup& s) { s.window = 10.0; });
   refused([](TouchSetup& s) { s.window = 0.001; });
   refused([](TouchSetup& s) { s.threshold = 0.0; });
+  refused([](TouchSetup& s) { s.threshold = std::numeric_limits<double>::quiet_NaN(); });
   refused([](TouchSetup& s) { s.force_threshold = -1.0; });
   refused([](TouchSetup& s) { s.wall.count_length = 0.0; });
   refused([](TouchSetup& s) { s.device.mass = -1.0; });

@@ -1,8 +1,12 @@
 #include "host_tools/experiment/max_stiffness/max_stiffness_search.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "host_tools/experiment/people/subject_set.hpp"
 
@@ -120,6 +124,56 @@ TEST(MaxStiffnessSearch, GrowingStepsMeetTheSameLimitWithinTheirSize) {
   EXPECT_NEAR(growing, equal, 0.03 * equal + 100.0);
 }
 
+void expect_equal(const MaxStiffness& one, const MaxStiffness& other, const std::string& what) {
+  EXPECT_EQ(one.stiffness, other.stiffness) << what;
+  EXPECT_EQ(one.beyond_last, other.beyond_last) << what;
+  EXPECT_EQ(one.never_touched, other.never_touched) << what;
+  EXPECT_EQ(one.ending_speed, other.ending_speed) << what;
+  EXPECT_EQ(one.ending_push, other.ending_push) << what;
+  EXPECT_EQ(one.ending_peak_to_peak, other.ending_peak_to_peak) << what;
+  EXPECT_EQ(one.saturated_share, other.saturated_share) << what;
+  EXPECT_EQ(one.touches, other.touches) << what;
+  EXPECT_EQ(one.event_limit_hits, other.event_limit_hits) << what;
+  EXPECT_EQ(one.simulated_time, other.simulated_time) << what;
+}
+
+// Whichever ends first, from above or from below, with a field, a limit that clips, a delay or a bend.
+TEST(MaxStiffnessSearch, SeveralProtocolsAtOnceFindWhatEachFindsAlone) {
+  const std::vector<TouchProtocol> protocols{
+      {.approach_speeds = {0.1, 0.5}, .pushes = {0.6, 1.0}},
+      {.approach_speeds = {0.1, 0.5}, .pushes = {0.6, 1.0}, .force_threshold = 0.3},
+      {.approach_speeds = {0.1, 0.5}, .pushes = {0.6, 1.0}, .phases = 3},
+      {.approach_speeds = {0.1, 0.5}, .pushes = {0.6, 1.0}, .phases = 3, .threshold = 0.03e-3},
+      {.approach_speeds = {0.1, 0.5}, .pushes = {0.6, 1.0}, .threshold = 10e-3}};  // never ends
+  const auto people = draw_subjects(4, 7);
+  std::size_t different_ends = 0;
+  for (std::size_t n = 0; n < people.size(); ++n) {
+    TouchSetup setup = plain(people[n].person);
+    StiffnessSteps steps{.first = 500.0, .step = 100.0, .last = 12e3};
+    if (n == 1) setup.wall.wall.magnetic_coefficient = 2.0F;
+    if (n == 1) setup.wall.wall.kind = control::WallKind::magnetic;
+    if (n == 2) setup.device.delay = 0.3e-3;
+    if (n == 2) steps = {.first = 4e3, .step = 100.0, .last = 6e3, .goes_down = true};
+    if (n == 3) steps = {.first = 100.0, .step = 10.0, .growth = 0.03, .last = 30e3};
+    if (n == 3) setup.device.structure = simulation::StructureModel{5e3, 1.0, 0.02};
+    const auto together = search_max_stiffness_by_each(setup, protocols, steps);
+    ASSERT_EQ(together.size(), protocols.size());
+    for (std::size_t k = 0; k < protocols.size(); ++k)
+      expect_equal(together[k], search_max_stiffness(setup, protocols[k], steps),
+                   fmt::format("{}, {}", n, k));
+    EXPECT_TRUE(together.back().beyond_last);
+    std::set<double> ends;
+    for (const MaxStiffness& found : together) ends.insert(found.stiffness);
+    different_ends += ends.size();
+  }
+  EXPECT_GE(different_ends, 10U) << "or nothing has been asked";
+  TouchSetup timid = plain({});
+  std::vector<TouchProtocol> hovering{{.pushes = {0.0}}, {.pushes = {0.0}, .force_threshold = 1.0}};
+  for (const MaxStiffness& none : search_max_stiffness_by_each(timid, hovering, {}))
+    EXPECT_TRUE(none.never_touched);
+  EXPECT_TRUE(search_max_stiffness_by_each(timid, {}, {}).empty());
+}
+
 // An integrator that shares nothing with the exact scheme, at 10 us, from three steps below the limit on. At
 // 125 us it is as exact as the scheme already (docs/speed_and_error.md), and at 1 us it finds the same eight
 // walls.
@@ -155,6 +209,14 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = -1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = 2.0, .last = 1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.last = std::nan("")}), std::invalid_argument);
+  const auto refused_beside_the_usual = [&](const TouchProtocol& other) {
+    EXPECT_THROW(search_max_stiffness_by_each(setup, std::vector<TouchProtocol>{{.phases = 4}, other}, {}),
+                 std::invalid_argument);
+  };
+  refused_beside_the_usual({.approach_speeds = {0.1}});
+  refused_beside_the_usual({.pushes = {0.1}});
+  refused_beside_the_usual({.phases = 2});
+  refused_beside_the_usual({.phases = 0});
 }
 
 }  // namespace kmax::experiment::max_stiffness_search_test
