@@ -47,7 +47,10 @@ report::Section provenance_section(const Provenance& provenance) {
   if (provenance.seed) {
     section.paragraphs.push_back(fmt::format("Seed of what is simulated by chance: {}.", *provenance.seed));
   } else if (provenance.device.empty()) {
-    section.paragraphs.emplace_back("Nothing in it is drawn by chance.");
+    section.paragraphs.emplace_back(
+        "Nothing is left to chance: whoever and whatever is drawn comes from fixed seeds, so the same "
+        "sources "
+        "give the same numbers.");
   }
   for (const std::string& reference : references()) section.paragraphs.push_back(reference);
   return section;

@@ -27,7 +27,7 @@ TEST(ProvenanceSection, SaysWhenWithWhatOnWhatAndAfterWhom) {
 TEST(ProvenanceSection, SaysThatThereIsNothingToSay) {
   const std::string people = text_of({"2026-01-02", "kmax", "", {}, {}});
   EXPECT_CONTAINS(people, "kmax, on simulated people, without a device.");
-  EXPECT_CONTAINS(people, "Nothing in it is drawn by chance.");
+  EXPECT_CONTAINS(people, "comes from fixed seeds");
   EXPECT_EQ(people.find("defaults"), std::string::npos);
   EXPECT_CONTAINS(text_of({"2026-01-02", "kmax", "sim", {}, 1}), "All parameters are the defaults.");
   EXPECT_EQ(text_of({"2026-01-02", "kmax", "serial:/dev/x", {}, {}}).find("chance"), std::string::npos);
