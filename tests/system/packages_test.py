@@ -57,6 +57,15 @@ class Packages(unittest.TestCase):
         left = {path for path in root.rglob("*") if path.is_file() and "var/lib/dpkg" not in str(path)} - before
         self.assertEqual(left, set())
 
+    def test_names_what_it_depends_on(self):
+        for name, needed in (("kmax", ("libc6", "libfmt9", "libmodbus5", "libgpiod2")), ("libkmax-dev", ("libc6", "libstdc++6")),
+                             ("python3-kmax", ("python3-numpy", "libkmax-dev"))):
+            package = next(self.made.glob(f"{name}_*.deb"))
+            depends = subprocess.run(["dpkg-deb", "--field", str(package), "Depends"], capture_output=True, text=True,
+                                     check=True).stdout
+            for other in needed:
+                self.assertRegex(depends, rf"(^|, ){other.replace('+', '[+]')}( |,|$)", f"{name} depends on {depends}")
+
     @property
     def release(self):
         return next(self.made.glob("kmax-*/environment")).parent
