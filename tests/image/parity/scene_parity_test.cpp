@@ -22,7 +22,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "tests/image/axis_tick_calls.hpp"
+#include "tests/image/parity/axis_tick_calls.hpp"
 
 namespace kmax::tests::scene_parity_test {
 

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "drivers/stm32f4/current_sampling.hpp"
-#include "tests/image/axis_tick_calls.hpp"
+#include "tests/image/parity/axis_tick_calls.hpp"
 
 namespace kmax::tests::parity_test {
 

@@ -158,7 +158,7 @@ TEST(ImageUsbSetUps, AnswersWhatChapterNineAsksAsThePageSays) {
   EXPECT_EQ(made.find("BROKEN"), std::string::npos) << made;
   std::ifstream file(page);
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  const std::string begin_mark = "<!-- chapter 9: made by image_tests -->\n",
+  const std::string begin_mark = "<!-- chapter 9: made by image_link_tests -->\n",
                     end_mark = "<!-- end of chapter 9 -->\n";
   const std::size_t begin = text.find(begin_mark), end = text.find(end_mark);
   ASSERT_NE(begin, std::string::npos);
