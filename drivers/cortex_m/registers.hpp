@@ -310,7 +310,7 @@ using TraceEnable = Field<24>;  // TRCENA: clocks DWT and ITM
 }  // namespace core_debug_demcr
 
 // Data watchpoint and trace unit of the Cortex-M4, its cycle counter only. ARMv7-M architecture reference
-// manual, C1.8. Dead until DEMCR.TRCENA is set (registers/core_debug.hpp).
+// manual, C1.8. Dead until DEMCR.TRCENA is set (core_debug_demcr, above).
 
 struct DwtRegisters {
   volatile std::uint32_t ctrl;

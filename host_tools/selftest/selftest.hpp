@@ -48,7 +48,7 @@ class SelfTestEnded : public std::runtime_error {
 ///   5  the swing once more with the supply watched
 ///
 /// The bounds go by the claimed mass and torque constant, or by the mobility that the pulses before have
-/// shown, whichever is larger (pulse_plan.hpp); and excitation.travel trips at 0.8 mm from the start.
+/// shown, whichever is larger (pulse.hpp); and excitation.travel trips at 0.8 mm from the start.
 ///
 /// It ends early where a result explains why going on would say nothing. A handle that something else has
 /// moved by more than a millimetre, or past excitation.travel, is a failed check.
