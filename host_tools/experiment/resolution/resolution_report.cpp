@@ -214,12 +214,13 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study) {
             : "Where 0.1 mm vibrates, the encoder's own step does so too: the onset with speed is not the "
               "work of the resolution here but of the loop itself (delay, sampling, a light grip), which a "
               "fast touch sets going. Only the vibration of 0.4 mm at low speed is that of a coarse step.");
-  words.push_back(
-      fmt::format("The paper's criterion K max(eta, delta v T) <= F_h is quasi-static and not a condition of "
-                  "passivity. It asks {:.2f} N of a hand at 0.4 mm and {:.2f} N at 0.1 mm, and begins to "
-                  "depend on the speed at {:g} and {:g} m/s.",
-                  study.wall.stiffness * 0.4e-3, study.wall.stiffness * 0.1e-3,
-                  0.4e-3 * study.wall.haptic_rate, 0.1e-3 * study.wall.haptic_rate));
+  words.push_back(fmt::format(
+      "The paper's criterion K max(eta, delta v T) <= F_h is quasi-static and not a condition of passivity. "
+      "It asks {:.2f} N of a hand at 0.4 mm and {:.2f} N at 0.1 mm, and begins to depend on the speed at "
+      "{:g} "
+      "and {:g} m/s. The table has what it asks at the step of whole counts, which is a little smaller.",
+      study.wall.stiffness * 0.4e-3, study.wall.stiffness * 0.1e-3, 0.4e-3 * study.wall.haptic_rate,
+      0.1e-3 * study.wall.haptic_rate));
   return words;
 }
 

@@ -102,7 +102,8 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
           settings.fast, settings.hold_time),
       fmt::format(
           "Pulse: {:g} s after the touch the device adds +{:g} N and then -{:g} N to the wall's force, "
-          "for {:g} ms each or as long as its link takes{}. Let go: the hand opens at that time.",
+          "for {:g} ms each or as long as its link takes{}. Let go: the hand opens at that time; a "
+          "handle that has left the wall then and stands still outside counts as stable.",
           settings.event_time(), settings.pulse_force, settings.pulse_force, settings.pulse_time * 1e3,
           [&] {
             double longest = 0.0;
