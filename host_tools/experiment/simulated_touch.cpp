@@ -205,9 +205,10 @@ std::vector<TouchOutcome> run_touch(const TouchSetup& setup, std::span<const Tou
 }  // namespace
 
 TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* recording) {
-  if (!(setup.force_threshold >= 0.0))
+  if (!(setup.threshold > 0.0 && setup.force_threshold >= 0.0))
     throw std::invalid_argument(fmt::format(
-        "force threshold of {} N peak to peak: it must be 0 (not used) or above", setup.force_threshold));
+        "threshold of {} m or {} N peak to peak: the first must be above 0, the second 0 (not used) or above",
+        setup.threshold, setup.force_threshold));
   const TouchJudgement moves{false, setup.threshold}, swings{true, setup.force_threshold};
   std::vector<TouchJudgement> judgements;
   const bool by_force = setup.force_threshold > 0.0;

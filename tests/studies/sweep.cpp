@@ -13,6 +13,7 @@ std::string n_per_mm(double stiffness) {
 
 std::vector<TouchProtocol> by_both(const StiffnessRun& run) {
   std::vector<TouchProtocol> protocols(2, run.protocol);
+  protocols.front().force_threshold = 0.0;
   protocols.back().force_threshold = felt_force;
   return protocols;
 }

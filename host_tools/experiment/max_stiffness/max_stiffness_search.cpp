@@ -12,6 +12,10 @@ namespace {
 void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
   if (protocol.touches() == 0)
     throw std::invalid_argument("no touch: name at least one approach speed, one push force and one phase");
+  if (!(protocol.threshold > 0.0 && protocol.force_threshold >= 0.0))
+    throw std::invalid_argument(fmt::format(
+        "thresholds of {} m and {} N peak to peak: allowed are above 0, and 0 (not used) or above",
+        protocol.threshold, protocol.force_threshold));
   const double first_adaptive = steps.first_adaptive.value_or(steps.first);
   if (!(steps.first > 0.0 && first_adaptive > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 &&
         steps.last >= std::max(steps.first, first_adaptive) && steps.last <= 1e7))

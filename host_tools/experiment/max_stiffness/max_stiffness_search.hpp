@@ -57,7 +57,8 @@ struct MaxStiffness {
   double simulated_time = 0.0;  // s
 };
 
-// `setup`: everything but stiffness, approach speed, push and thresholds. Throws std::invalid_argument.
+// `setup`: everything but stiffness, approach speed, push and criterion, which the protocol has. Throws
+// std::invalid_argument.
 MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& protocol,
                                   const StiffnessSteps& steps);
 

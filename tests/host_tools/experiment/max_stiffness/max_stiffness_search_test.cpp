@@ -162,6 +162,7 @@ TEST(MaxStiffnessSearch, SeveralProtocolsAtOnceFindWhatEachFindsAlone) {
       expect_equal(together[k], search_max_stiffness(setup, protocols[k], steps),
                    fmt::format("{}, {}", n, k));
     EXPECT_TRUE(together.back().beyond_last);
+    EXPECT_EQ(together.front().stiffness < steps.first, n == 2) << "and has gone down";
     std::set<double> ends;
     for (const MaxStiffness& found : together) ends.insert(found.stiffness);
     different_ends += ends.size();
@@ -209,6 +210,9 @@ TEST(MaxStiffnessSearch, RefusesStepsAndTouchesThatMakeNoSense) {
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = -1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.first = 2.0, .last = 1.0}), std::invalid_argument);
   EXPECT_THROW(search_max_stiffness(setup, {}, {.last = std::nan("")}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.threshold = 0.0}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.force_threshold = -1.0}, {}), std::invalid_argument);
+  EXPECT_THROW(search_max_stiffness(setup, {.force_threshold = std::nan("")}, {}), std::invalid_argument);
   const auto refused_beside_the_usual = [&](const TouchProtocol& other) {
     EXPECT_THROW(search_max_stiffness_by_each(setup, std::vector<TouchProtocol>{{.phases = 4}, other}, {}),
                  std::invalid_argument);
