@@ -49,8 +49,7 @@ report::Section provenance_section(const Provenance& provenance) {
   } else if (provenance.device.empty()) {
     section.paragraphs.emplace_back(
         "Nothing is left to chance: whoever and whatever is drawn comes from fixed seeds, so the same "
-        "sources "
-        "give the same numbers.");
+        "sources give the same numbers.");
   }
   for (const std::string& reference : references()) section.paragraphs.push_back(reference);
   return section;

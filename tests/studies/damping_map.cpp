@@ -28,6 +28,7 @@ std::string short_cell(const PeopleMean& found) {
   return fmt::format("{}{}{:.1f}", found.ends.at_zero > 0 ? "<" : "", found.ends.beyond_last > 0 ? ">" : "",
                      found.mean / 1e3);
 }
+
 /// The map's place with the most that is stable by both criteria.
 std::size_t best_of(const std::array<TwoMeans, map_dampings.size()>& found) {
   const auto best = std::max_element(found.begin(), found.end(), [](const auto& one, const auto& other) {
@@ -116,10 +117,8 @@ report::Section damping_section(const SubjectSet& set, const std::vector<Damping
           "{} people, touches at {} m/s with {} N, in steps of 3 % from 0.2 N/mm. A row of the last table "
           "changes one thing of the first; a structure bends between motor and hand (20 of the 45 g behind "
           "it, 1 N s/m). One count of 55 um is 1 N at 18.2 N/mm: by the force more is found only where a "
-          "handle "
-          "comes to rest without flickering between two counts. The last table's means are of what each of "
-          "the "
-          "people can have by the criterion that gives it less.",
+          "handle comes to rest without flickering between two counts. The last table's means are of what "
+          "each of the people can have by the criterion that gives it less.",
           set.subjects.size(), fmt::join(map_speeds, " and "), fmt::join(map_pushes, " and ")),
       fmt::format("The best damped plain wall, without any field, allows more than the field of 2 N in {} "
                   "of {} rows. \"<\" and \">\": some people count with 0, or with the last stiffness of the "

@@ -2,7 +2,7 @@
 // The largest stable stiffness of each wall of paper 1 (Figs. 6 and 8) on a device, with a person's hand on
 // its handle, or with a simulated hand on a device that is served.
 //
-// Each stiffness of the climb below is touched `trials` times; one unstable touch decides (the paper's
+// Each stiffness of a StiffnessClimb is touched `trials` times; one unstable touch decides (the paper's
 // definition). Every touch is watched_touch.hpp's: limited, watched, disarmed at once when the handle
 // oscillates too much, which counts as unstable. Each touch that is over is in the journal at once: a run
 // that was interrupted goes on with the next one.
