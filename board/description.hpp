@@ -4,6 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <string_view>
+#include <type_traits>
+
+#include "drivers/current_sense.hpp"
+#include "drivers/ntc_thermistor.hpp"
 
 namespace kmax::board {
 
@@ -18,9 +22,10 @@ struct BoardDescription {
   /// Of the supply, for the current controllers, by the amplifiers' gain (drivers::CurrentSenseGain); below
   /// largest_duty().
   std::array<float, 4> modulation_limit;
-  double supply_ratio;                ///< of the supply to the voltage at the converter's pin
-  double gate_driver_supply_minimum;  ///< V; below it the gate drivers report a fault
-  double brake_pulse;                 ///< s, for which a tick switches the brake resistor on
+  double shunt;                             ///< ohm, of a phase current
+  drivers::NtcThermistorConfig thermistor;  ///< of a power stage
+  double gate_driver_supply_minimum;        ///< V; below it the gate drivers report a fault
+  double brake_pulse;                       ///< s, for which a tick switches the brake resistor on
 
   constexpr double pwm_hz() const { return timer_clock_hz / (2.0 * half_period_ticks); }
   constexpr double dead_time() const { return static_cast<double>(dead_time_ticks) / timer_clock_hz; }  ///< s
@@ -34,5 +39,10 @@ struct BoardDescription {
            largest_duty() + 1e-6;
   }
 };
+
+/// What is a fact of a board has no default below it, which would be a second place for the fact.
+template <typename... Configs>
+inline constexpr bool without_defaults = (std::is_trivially_default_constructible_v<Configs> && ...);
+static_assert(without_defaults<drivers::CurrentSenseConfig, drivers::NtcThermistorConfig>);
 
 }  // namespace kmax::board

@@ -30,24 +30,18 @@ constexpr float gain_factor(CurrentSenseGain gain) {
 }
 
 struct CurrentSenseConfig {
-  float shunt_ohm = 0.0005F;  // above 0
-  CurrentSenseGain gain = CurrentSenseGain::x40;
-  float reference_volt = 3.3F;  // of the converter and of the amplifier
-  // Codes outside say nothing about the current any more: the amplifier is linear from 0.3 V to 3.0 V. The
-  // highest is not below the lowest.
-  std::uint16_t lowest_linear_code = 373;
-  std::uint16_t highest_linear_code = 3723;
+  float shunt_ohm;  // above 0
+  CurrentSenseGain gain;
 };
 
 class CurrentSense {
  public:
   static constexpr float middle_code = 2048.0F;
+  static constexpr float reference_volt = 3.3F;  ///< of the converter and of the amplifier
 
   /// Two divisions: not for the interrupt path.
-  constexpr explicit CurrentSense(const CurrentSenseConfig& config = {})
-      : amperes_per_code_(config.reference_volt / 4096.0F / (gain_factor(config.gain) * config.shunt_ohm)),
-        lowest_(config.lowest_linear_code),
-        width_(static_cast<std::uint16_t>(config.highest_linear_code - config.lowest_linear_code)) {}
+  constexpr explicit CurrentSense(const CurrentSenseConfig& config)
+      : amperes_per_code_(reference_volt / 4096.0F / (gain_factor(config.gain) * config.shunt_ohm)) {}
 
   /// The code at zero current, from OffsetCalibration.
   constexpr void set_offset(float code) { offset_ = origin_ = code; }
@@ -81,20 +75,21 @@ class CurrentSense {
   /// The true current may be anything beyond what the code says: treat it as over-current. A code below the
   /// lowest wraps, so one comparison is enough.
   constexpr bool ISR_saturated(std::uint16_t code) const {
-    return std::uint32_t{code} - std::uint32_t{lowest_} > width_;
+    return std::uint32_t{code} - lowest_linear_code > highest_linear_code - lowest_linear_code;
   }
 
   /// The largest current that reads without saturation in both directions, A.
   constexpr float range() const {
-    const float up = (static_cast<float>(lowest_ + width_) - offset_) * amperes_per_code_;
-    const float down = (offset_ - static_cast<float>(lowest_)) * amperes_per_code_;
+    const float up = (static_cast<float>(highest_linear_code) - offset_) * amperes_per_code_;
+    const float down = (offset_ - static_cast<float>(lowest_linear_code)) * amperes_per_code_;
     return up < down ? up : down;
   }
 
  private:
+  /// Codes outside say nothing about the current any more: the amplifier is linear from 0.3 V to 3.0 V.
+  static constexpr std::uint32_t lowest_linear_code = 373, highest_linear_code = 3723;
+
   float amperes_per_code_;
-  std::uint16_t lowest_;
-  std::uint16_t width_;  ///< of the linear codes, less one
   float offset_ = middle_code;
   float origin_ = middle_code;  ///< the offset when driving last began or ended
 };
@@ -103,22 +98,13 @@ namespace detail {
 /// By gain, as CurrentSenseGain counts them; made by the compiler.
 inline constexpr std::size_t gains = 4;
 inline constexpr auto offset_window = [] {
-  constexpr float input_offset_volt = 0.004F, codes_per_volt = 4096.0F / CurrentSenseConfig{}.reference_volt;
+  constexpr float input_offset_volt = 0.004F, codes_per_volt = 4096.0F / CurrentSense::reference_volt;
   std::array<std::uint16_t, gains> codes{};
   for (unsigned gain = 0; gain < gains; ++gain) {
     const float off = input_offset_volt * gain_factor(static_cast<CurrentSenseGain>(gain)) * codes_per_volt;
     codes[gain] = static_cast<std::uint16_t>(off + 15.5F);
   }
   return codes;
-}();
-inline constexpr auto sure_range = [] {
-  std::array<float, gains> amperes{};
-  for (unsigned gain = 0; gain < gains; ++gain) {
-    CurrentSense sense{{.gain = static_cast<CurrentSenseGain>(gain)}};
-    sense.set_offset(CurrentSense::middle_code + static_cast<float>(offset_window[gain]));
-    amperes[gain] = sense.range();
-  }
-  return amperes;
 }();
 }  // namespace detail
 
@@ -129,11 +115,15 @@ constexpr std::uint16_t offset_window(CurrentSenseGain gain) {
 }
 
 /// The largest gain, and so the finest step, with which this current (A) is read without saturation, whatever
-/// the offset; x10 when none is.
-constexpr CurrentSenseGain gain_for_current(float largest_current) {
-  std::size_t gain = detail::gains - 1;
-  while (gain > 0 && !(detail::sure_range[gain] >= largest_current)) --gain;
-  return static_cast<CurrentSenseGain>(gain);
+/// the offset; x10 when none is. Divides: not for the interrupt path.
+constexpr CurrentSenseGain gain_for_current(float largest_current, float shunt_ohm) {
+  const auto reads = [=](CurrentSenseGain gain) {
+    CurrentSense sense{{.shunt_ohm = shunt_ohm, .gain = gain}};
+    sense.set_offset(CurrentSense::middle_code + static_cast<float>(offset_window(gain)));
+    return sense.range() >= largest_current;
+  };
+  using enum CurrentSenseGain;
+  return reads(x80) ? x80 : reads(x40) ? x40 : reads(x20) ? x20 : x10;
 }
 
 struct OffsetCalibrationConfig {

@@ -12,19 +12,18 @@
 // straight lines between them: one multiplication, no logarithm, no division at run time. 516 bytes of flash
 // when the object is constexpr.
 //
-// Largest difference from the formula with the default values (10 kOhm, beta 3434, 3.3 kOhm: ODrive v3.6):
-// 0.02 K from 0 to 120 degC, 0.07 K from -20 to 150 degC, 0.7 K from -40 to 180 degC. The step of one code is
-// 0.034 K at 25 degC and 0.081 K at 120 degC. How far the part follows its beta is the part's matter (+-1 %
-// in beta is 2.4 K at 120 degC).
+// Largest difference from the formula with 10 kOhm, beta 3434 and 3.3 kOhm: 0.02 K from 0 to 120 degC, 0.07 K
+// from -20 to 150 degC, 0.7 K from -40 to 180 degC. The step of one code is 0.034 K at 25 degC and 0.081 K at
+// 120 degC. How far the part follows its beta is the part's matter (+-1 % in beta is 2.4 K at 120 degC).
 
 namespace kmax::drivers {
 
 struct NtcThermistorConfig {
-  double resistance_25_ohm = 10'000.0;
-  double beta_kelvin = 3434.0;
-  double ground_resistor_ohm = 3'300.0;
-  std::uint16_t open_below = 48;       // code; -42 degC with the default values
-  std::uint16_t shorted_above = 3936;  // 203 degC
+  double resistance_25_ohm;
+  double beta_kelvin;
+  double ground_resistor_ohm;
+  std::uint16_t open_below;     // code
+  std::uint16_t shorted_above;  // code
 };
 
 enum class NtcState : std::uint8_t {
@@ -64,7 +63,7 @@ consteval double natural_logarithm(double x) {
 
 class NtcThermistor {
  public:
-  consteval explicit NtcThermistor(const NtcThermistorConfig& config = {})
+  consteval explicit NtcThermistor(const NtcThermistorConfig& config)
       : open_below_(config.open_below), shorted_above_(config.shorted_above) {
     for (unsigned i = 0; i <= segments; ++i) {
       // The ends have no temperature (R infinite or zero): the nearest code that has.

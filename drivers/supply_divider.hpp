@@ -6,21 +6,14 @@
 //
 //   volt = code * reference / 4096 * ratio
 //
-// ODrive v3.6: 1 kOhm below, 10 kOhm above (ratio 11, full scale 36.3 V) on the 24 V board; 18 kOhm above
-// (ratio 19, 62.7 V) on the 56 V board. Nothing on the board tells the variants apart, so the ratio is
-// configuration; the wrong one reads 1.7 times too much or 0.58 of the truth.
+// The reference is 3.3 V. The ratio is that of the supply to the voltage at the tap: 11 has a full scale of
+// 36.3 V, 19 one of 62.7 V.
 
 namespace kmax::drivers {
 
-struct SupplyDividerConfig {
-  float ratio = 19.0F;  // supply / voltage at the tap
-  float reference_volt = 3.3F;
-};
-
 class SupplyDivider {
  public:
-  constexpr explicit SupplyDivider(const SupplyDividerConfig& config = {})
-      : volts_per_code_(config.reference_volt * (1.0F / 4096.0F) * config.ratio) {}
+  constexpr explicit SupplyDivider(float ratio) : volts_per_code_(3.3F * (1.0F / 4096.0F) * ratio) {}
 
   constexpr float volts(std::uint16_t code) const { return static_cast<float>(code) * volts_per_code_; }
   /// The supply may be anything above what the code says.

@@ -260,7 +260,7 @@ void tick_without_power() {
   stm32::enable_peripheral_clock(stm32::rcc().ahb2enr, stm32::rcc_ahb2enr::OtgFs::mask);
   apply(usb_pins);
   usb_line.emplace(interrupts, application->usb(), system_tick, usb_identity(serial_number_from_unique_id()),
-                   boot_loader_is_safe(otp_byte));
+                   clocks.apb1_hz, boot_loader_is_safe(otp_byte));
   if (good_clock) usb_line->start();
 
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes

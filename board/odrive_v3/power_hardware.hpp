@@ -27,6 +27,8 @@ namespace kmax::board::odrive_v3 {
 /// fill.
 class PowerHardware {
  public:
+  static constexpr const BoardDescription& description = odrive_v3::description;
+
   explicit PowerHardware(ChipBus& bus)
       : gate_drivers_(bus),
         serial_encoder_(bus, pin(pins::encoder_select)),
@@ -35,7 +37,7 @@ class PowerHardware {
         encoder0_(drivers::stm32f4::tim3()),
         encoder1_(drivers::stm32f4::tim4()),
         sampling_(drivers::stm32f4::adc(1), drivers::stm32f4::adc(2), drivers::stm32f4::adc(3),
-                  drivers::stm32f4::adc_common()),
+                  drivers::stm32f4::adc_common(), sampling_config),
         brake_(drivers::stm32f4::tim2()),
         watch_(drivers::stm32f4::tim1(), drivers::stm32f4::tim8(), drivers::stm32f4::dma2()) {}
 
@@ -66,9 +68,6 @@ class PowerHardware {
   }
   drivers::stm32f4::ZeroCurrentCodes zero_current(std::size_t axis) const {
     return sampling_.zero_current(static_cast<unsigned>(axis));
-  }
-  static constexpr float modulation_limit(drivers::CurrentSenseGain gain) {
-    return description.modulation_limit[static_cast<std::size_t>(gain)];
   }
   std::uint16_t ISR_counter(std::size_t axis) const {
     return axis == 0 ? encoder0_.count() : encoder1_.count();

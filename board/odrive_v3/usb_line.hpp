@@ -41,11 +41,11 @@ class UsbLine {
  public:
   UsbLine(drivers::cortex_m::InterruptController<>& interrupts, firmware::UsbModbusEdge& link,
           const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity,
-          bool boot_loader_is_safe)
+          std::uint32_t can_clock_hz, bool boot_loader_is_safe)
       : interrupts_(interrupts),
         clock_(clock),
         boot_loader_is_safe_(boot_loader_is_safe),
-        functions_(controller_, link, clock),
+        functions_(controller_, link, clock, can_clock_hz),
         device_(controller_, functions_, identity) {}
 
   /// Clock and pins are on, the interrupt has its priority, 48 MHz come from the crystal. Without a core that

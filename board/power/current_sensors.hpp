@@ -15,6 +15,9 @@ namespace kmax::board {
 /// while ISR_calibrate() is not called.
 class CurrentSensors {
  public:
+  constexpr explicit CurrentSensors(float shunt_ohm)
+      : sense_b_({shunt_ohm, drivers::CurrentSenseGain::x80}), sense_c_(sense_b_), shunt_ohm_(shunt_ohm) {}
+
   bool ISR_saturated(std::uint16_t code_b, std::uint16_t code_c) const {
     return sense_b_.ISR_saturated(code_b) || sense_c_.ISR_saturated(code_c);
   }
@@ -28,7 +31,7 @@ class CurrentSensors {
   }
 
   void restart_calibration(drivers::CurrentSenseGain gain) {
-    sense_b_ = sense_c_ = drivers::CurrentSense{{.gain = gain}};
+    sense_b_ = sense_c_ = drivers::CurrentSense{{.shunt_ohm = shunt_ohm_, .gain = gain}};
     for (auto* offset : {&offset_b_, &offset_c_}) offset->restart(drivers::offset_window(gain));
   }
   OffsetProgress calibration_progress() const {
@@ -62,10 +65,11 @@ class CurrentSensors {
   float offset_c() const { return sense_c_.offset_amperes(); }
 
  private:
-  drivers::CurrentSense sense_b_{}, sense_c_{};
+  drivers::CurrentSense sense_b_, sense_c_;
   drivers::OffsetCalibration offset_b_{}, offset_c_{};
   bool tracked_driven_ = false;
   std::uint16_t tracked_for_ = 0;  ///< ms since driving began or ended
+  float shunt_ohm_;
 };
 
 }  // namespace kmax::board

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "board/description.hpp"
 #include "drivers/current_sense.hpp"
 
 namespace kmax::board {
@@ -12,6 +13,9 @@ namespace kmax::board {
 /// called in the tick.
 template <typename Hardware>
 concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, std::size_t axis, bool level) {
+  /// The board's facts, known when this is compiled.
+  { Hardware::description } -> std::convertible_to<const BoardDescription&>;
+
   /// False: an axis that this board does not drive. Its other functions are not called.
   { constant.has(axis) } -> std::same_as<bool>;
 
@@ -37,9 +41,6 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   /// lie as far above 0 as below 1.
   { hardware.zero_current(axis).phase_b } -> std::convertible_to<std::uint16_t>;
   { hardware.zero_current(axis).phase_c } -> std::convertible_to<std::uint16_t>;
-  /// Of the supply, that the current controllers may use: so that an amplifier of this gain has settled when
-  /// it is sampled.
-  { constant.modulation_limit(drivers::CurrentSenseGain::x80) } -> std::same_as<float>;
 
   /// The free-running counter of the axis' quadrature lines, and its index line at the same moment.
   { constant.ISR_counter(axis) } -> std::unsigned_integral;

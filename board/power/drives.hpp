@@ -43,7 +43,7 @@ class Drives {
   /// `supply_ratio`: of the supply to the voltage at the converter's pin. The rest makes the hardware.
   template <typename... Arguments>
   explicit Drives(float supply_ratio, Arguments&&... hardware)
-      : hardware_(std::forward<Arguments>(hardware)...), supply_({.ratio = supply_ratio}) {
+      : hardware_(std::forward<Arguments>(hardware)...), supply_(supply_ratio) {
     static_assert(DriveHardware<Hardware>);
   }
 
@@ -164,7 +164,7 @@ class Drives {
   using Count = typename Counter::Reading;
   /// Generations of the AS5047P's counts have the uppermost bit, so that a change of encoder.kind is one too.
   static constexpr std::uint32_t serial_generations = 0x8000'0000U;
-  static constexpr drivers::NtcThermistor thermistor{};
+  static constexpr drivers::NtcThermistor thermistor{Hardware::description.thermistor};
 
   /// What the tick works by; made in the main loop.
   struct Settings {
@@ -179,7 +179,7 @@ class Drives {
     firmware::AxisInput input{.motor = {.present = true}};  ///< of its last tick
     std::uint32_t encoder_generation = 0;                   ///< of the settings that have been taken over
     Bridge bridge = Bridge::off;
-    CurrentSensors sensors{};
+    CurrentSensors sensors{static_cast<float>(Hardware::description.shunt)};
     Counter counter{};
   };
   using Inputs = std::array<firmware::AxisInput, firmware::axis_count>;
@@ -420,7 +420,7 @@ void Drives<Hardware>::apply(const firmware::ParameterValues& values,
   double_buffer_.offer(settings_);
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
     absent_[axis].store(absent[axis], std::memory_order_relaxed);
-  gain_ = drivers::gain_for_current(largest_current);
+  gain_ = drivers::gain_for_current(largest_current, static_cast<float>(Hardware::description.shunt));
 }
 
 template <typename Hardware>
@@ -472,7 +472,7 @@ firmware::BoardReadings Drives<Hardware>::readings() const {
     readings.offset_c[axis] = axes_[axis].sensors.offset_c();
   }
   readings.has_power_stage = true;
-  readings.modulation_limit = hardware_.modulation_limit(gain_);
+  readings.modulation_limit = Hardware::description.modulation_limit[static_cast<std::size_t>(gain_)];
   readings.supply_voltage = supply_.volts(hardware_.supply_code());
   readings.missed_ticks = hardware_.missed_ticks();
   return readings;

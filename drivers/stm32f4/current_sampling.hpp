@@ -51,17 +51,17 @@
 
 namespace kmax::drivers::stm32f4 {
 
-/// Which channels are where, and how long they are sampled. Defaults: ODrive v3.6.
+/// Which channels are where, and how long they are sampled.
 struct CurrentSamplingConfig {
   struct Phases {
     std::uint8_t b;  // converted by ADC2
     std::uint8_t c;  // converted by ADC3
   };
-  std::array<Phases, 2> axes{{{10, 11}, {13, 12}}};  // PC0, PC1; PC3, PC2
-  std::uint8_t supply = 6;                           // PA6
-  std::array<std::uint8_t, 2> temperatures{15, 4};   // power stage of axis 0 (PC5), axis 1 (PA4)
-  std::uint8_t current_sampling_code = 0;            // index into adc_sampling_cycles: 3 cycles
-  std::uint8_t slow_sampling_code = 2;               // 28 cycles
+  std::array<Phases, 2> axes;
+  std::uint8_t supply;
+  std::array<std::uint8_t, 2> temperatures;  // power stages of the axes
+  std::uint8_t current_sampling_code;        // index into adc_sampling_cycles
+  std::uint8_t slow_sampling_code;           // likewise, of supply and temperatures
 };
 
 /// Codes are 0 to 4095, 3.3 V full scale.
@@ -91,7 +91,7 @@ template <typename Adc = AdcRegisters, typename Common = AdcCommonRegisters>
 class CurrentSampling {
  public:
   constexpr CurrentSampling(Adc& adc1, Adc& adc2, Adc& adc3, Common& common,
-                            const CurrentSamplingConfig& config = {})
+                            const CurrentSamplingConfig& config)
       : adc1_(adc1), adc2_(adc2), adc3_(adc3), common_(common), config_(config) {
     const auto &first = config.axes[0], &second = config.axes[1];
     lists_ = {{{pair_of(first.b, second.b), pair_of(first.c, second.c)},

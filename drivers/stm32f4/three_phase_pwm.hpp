@@ -54,10 +54,9 @@ struct PwmLegs {
 };
 
 struct ThreePhasePwmConfig {
-  std::uint16_t half_period_ticks = 4200;                              // ARR
-  std::uint8_t dead_time_code = dead_time_code_for(168'000'000, 120);  // 21 ticks = 125 ns
-  std::uint16_t minimum_low_ticks = 252;  // above the dead time, below half_period_ticks
-  PwmLegs legs{};
+  std::uint16_t half_period_ticks;  // ARR
+  std::uint8_t dead_time_code;      // dead_time.hpp
+  std::uint16_t minimum_low_ticks;  // above the dead time, below half_period_ticks
 };
 
 /// Share of the period in which the high side is on, 0 to 1.
@@ -72,7 +71,7 @@ struct PhaseTicks {
 template <typename Registers = TimerRegisters>
 class ThreePhasePwm {
  public:
-  explicit constexpr ThreePhasePwm(Registers& registers, const ThreePhasePwmConfig& config = {})
+  explicit constexpr ThreePhasePwm(Registers& registers, const ThreePhasePwmConfig& config)
       : registers_(registers),
         config_(config),
         disarmed_(bdtr_without_main_output(config.dead_time_code)),
@@ -103,7 +102,7 @@ class ThreePhasePwm {
     for (unsigned leg = 0; leg < 3; ++leg) registers_.ccr[leg] = config_.half_period_ticks;
     load_counter(false);
     registers_.sr = 0;
-    static_cast<void>(enable_legs(config_.legs));
+    static_cast<void>(enable_legs({}));
     return static_cast<std::uint32_t>(registers_.bdtr) == disarmed_;
   }
 

@@ -31,7 +31,7 @@ struct MotorControlConfig {
   float current_limit = 5.0f;      ///< A
   float current_share = 1.0f;      ///< 0 .. 1 of current_limit that may be asked for: thermal derating
   float bandwidth = 3000.0f;       ///< rad/s
-  float modulation_limit = 0.88f;  ///< of the supply; a fact of the board
+  float modulation_limit = 0.0f;   ///< of the supply; a fact of the board: until it says so, no voltage
   float dead_time = 0.0f;          ///< s of the bridge that is made up for; 0: not
   float dead_time_current = 0.1f;  ///< A, within it that goes smoothly through zero
   float tick_rate = 20000.0f;      ///< Hz, also of the PWM

@@ -38,7 +38,9 @@ inline constexpr std::size_t can_channels = 2;
 template <EndpointController Controller>
 class CanFunction {
  public:
-  explicit CanFunction(Controller& controller) : controller_(controller) {}
+  /// `can_clock_hz`: of the controller on the bus, before its prescaler.
+  CanFunction(Controller& controller, std::uint32_t can_clock_hz)
+      : controller_(controller), can_clock_hz_(can_clock_hz) {}
 
   /// Main loop: the host has opened the channel, and is there.
   bool is_open(CanChannel channel) const {
@@ -122,9 +124,9 @@ class CanFunction {
       case gs::Request::bit_timing_constants: {
         if (setup.value >= can_channels) return std::nullopt;
         constexpr gs::TimingLimits l;
-        constexpr std::array words{gs::features,    l.clock_hz,      l.segment_1_min, l.segment_1_max,
-                                   l.segment_2_min, l.segment_2_max, l.jump_max,      l.prescaler_min,
-                                   l.prescaler_max, l.prescaler_step};
+        const std::array words{gs::features,    can_clock_hz_,   l.segment_1_min, l.segment_1_max,
+                               l.segment_2_min, l.segment_2_max, l.jump_max,      l.prescaler_min,
+                               l.prescaler_max, l.prescaler_step};
         for (std::size_t i = 0; i < words.size(); ++i) gs::put_word(room, 4 * i, words[i]);
         return room.first(gs::constants_bytes);
       }
@@ -255,6 +257,7 @@ class CanFunction {
   }
 
   Controller& controller_;
+  const std::uint32_t can_clock_hz_;
   InterruptQueue<gs::HostFrame, frames_from_host> from_host_;
   QueueToInterrupt<gs::HostFrame, frames_to_host> to_host_;
   std::atomic<std::uint8_t> open_{0};  ///< a bit for each channel; the interrupt writes it

@@ -22,8 +22,9 @@ inline constexpr std::uint16_t boot_loader_value = 0x4446;
 template <EndpointController Controller, typename Link, typename Clock>
 class Functions {
  public:
-  Functions(Controller& controller, Link& link, const Clock& clock)
-      : can_(controller), serial_(controller, link, clock) {}
+  /// `can_clock_hz`: see CanFunction.
+  Functions(Controller& controller, Link& link, const Clock& clock, std::uint32_t can_clock_hz)
+      : can_(controller, can_clock_hz), serial_(controller, link, clock) {}
 
   CanFunction<Controller>& can() { return can_; }
   SerialFunction<Controller, Link, Clock>& serial() { return serial_; }

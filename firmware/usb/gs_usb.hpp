@@ -40,7 +40,6 @@ inline constexpr std::uint32_t id_extended = 1U << 31, id_remote = 1U << 30, id_
 
 /// What bit timings may be, in time quanta of a prescaled clock; of the bxCAN (RM0090, CAN_BTR).
 struct TimingLimits {
-  std::uint32_t clock_hz = 42'000'000;
   std::uint32_t segment_1_min = 1, segment_1_max = 16;
   std::uint32_t segment_2_min = 1, segment_2_max = 8;
   std::uint32_t jump_max = 4;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "firmware/drive/profile_readings.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
@@ -172,8 +173,9 @@ namespace {
 /// `cold`: of a cold board, whose drift is not asked for.
 CheckResult offsets(device::Device& device, std::size_t axis, const Report* cold) {
   // The DRV8301's 4 mV, and its drift on the worst board, 15 uV/degC, doubled since the thermistor is not
-  // beside it: both guesses, its data sheet was not at hand (drivers/current_sense.hpp). 0.5 mohm.
-  constexpr double largest = 4e-3 / 0.5e-3, steepest = 2.0 * 15e-6 / 0.5e-3, least_warming = 5.0;
+  // beside it: both guesses, its data sheet was not at hand (drivers/current_sense.hpp).
+  constexpr double shunt = board::odrive_v3::description.shunt, largest = 4e-3 / shunt,
+                   steepest = 2.0 * 15e-6 / shunt, least_warming = 5.0;
   CheckResult check{"amplifier offsets"};
   const auto number = [&](const char* name) {
     return device.read_number(fmt::format("axis{}.measured.{}", axis, name));

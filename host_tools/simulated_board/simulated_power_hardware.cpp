@@ -61,8 +61,7 @@ bool SimulatedPowerHardware::ISR_index_line(std::size_t axis) const {
 }
 
 void SimulatedPowerHardware::set_brake(bool on) {
-  constexpr const board::BoardDescription& board = board::odrive_v3::description;
-  drives_.supply().set_brake(on ? board.brake_pulse * board.pwm_hz() : 0.0);
+  drives_.supply().set_brake(on ? description.brake_pulse * description.pwm_hz() : 0.0);
 }
 
 std::uint16_t SimulatedPowerHardware::temperature_code(std::size_t axis) const {
@@ -70,7 +69,7 @@ std::uint16_t SimulatedPowerHardware::temperature_code(std::size_t axis) const {
 }
 
 bool SimulatedPowerHardware::supply_suffices() const {
-  return drives_.supply().voltage() >= board::odrive_v3::description.gate_driver_supply_minimum;
+  return drives_.supply().voltage() >= description.gate_driver_supply_minimum;
 }
 
 void SimulatedPowerHardware::set_gate_enable(bool high) {

@@ -52,6 +52,8 @@ class SimulatedSerialEncoder {
 /// (drivers::QuadratureIndexWatch). They are counted in 32 bits, since a scene's handle may start anywhere.
 class SimulatedPowerHardware {
  public:
+  static constexpr const board::BoardDescription& description = board::odrive_v3::description;
+
   /// Codes of an axis' last conversion.
   struct Sample {
     static constexpr bool valid = true;
@@ -71,9 +73,6 @@ class SimulatedPowerHardware {
   /// Converts the currents of an axis that has a motor, and the supply; once in a tick.
   const Sample& ISR_sample(std::size_t axis);
   drivers::stm32f4::ZeroCurrentCodes zero_current(std::size_t axis);
-  static constexpr float modulation_limit(drivers::CurrentSenseGain gain) {
-    return board::odrive_v3::description.modulation_limit[static_cast<std::size_t>(gain)];
-  }
   std::uint32_t ISR_counter(std::size_t axis) const;
   bool ISR_index_line(std::size_t axis) const;
   SimulatedSerialEncoder& serial_encoder() { return serial_encoder_; }

@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "board/odrive_v3/description.hpp"
 #include "host_tools/simulation/model_field.hpp"
 #include "host_tools/simulation/noise_generator.hpp"
 
@@ -31,8 +32,8 @@ namespace kmax::simulation {
 // gate driver takes of the delay, 130 ns. Of the worst board, also by guess: offset 4 mV x gain, driven
 // 0.1 mV, gains that differ by 6 %.
 struct CurrentSensorConfig {
-  double shunt = 0.5e-3;  // ohm
-  double gain = 40.0;     // V/V, until set_gain()
+  double shunt = board::odrive_v3::description.shunt;  // ohm
+  double gain = 40.0;                                  // V/V, until set_gain()
   double noise = 0.0;     // V at the amplifier's input, standard deviation; 10 uV is 20 mA with 0.5 mOhm
   double offset_b = 0.0;  // V at the pin
   double offset_c = 0.0;  // V at the pin

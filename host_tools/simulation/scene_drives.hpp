@@ -18,6 +18,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "firmware/object_dictionary/entry.hpp"
 #include "host_tools/simulation/defect.hpp"
@@ -83,7 +84,7 @@ class SceneDrives {
     InverterCommand command;
     EncoderKind encoder_kind = EncoderKind::quadrature;
     bool encoder_reversed = false;  // as it is mounted
-    TemperatureSensor temperature;
+    TemperatureSensor temperature{board::odrive_v3::description.thermistor};
     std::array<bool, defect_names.size()> defects{};
     bool moves = false;  // somebody holds it who has a motion
     bool let_go = false;

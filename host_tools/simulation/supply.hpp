@@ -18,6 +18,7 @@
 
 #include <array>
 
+#include "board/odrive_v3/voltage_variant.hpp"
 #include "host_tools/simulation/model_field.hpp"
 
 namespace kmax::simulation {
@@ -28,9 +29,11 @@ struct SupplyConfig {
   double resistance = 0.05;       // ohm, R
   double capacitance = 1e-3;      // F, C
   double brake_resistance = 2.0;  // ohm
-  double divider_ratio = 11.0;    // bus voltage per voltage at the converter's pin
-  bool absorbs = false;           // the source takes current back
-  bool part_ratings = true;       // the board's parts break (SceneDrives)
+  // Bus voltage per voltage at the converter's pin.
+  double divider_ratio =
+      static_cast<double>(board::odrive_v3::supply_divider_ratio(board::odrive_v3::VoltageVariant::v24));
+  bool absorbs = false;      // the source takes current back
+  bool part_ratings = true;  // the board's parts break (SceneDrives)
 };
 
 inline constexpr std::array supply_fields{

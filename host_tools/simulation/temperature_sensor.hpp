@@ -11,21 +11,16 @@
 
 #include <fmt/format.h>
 
-namespace kmax::simulation {
+#include "drivers/ntc_thermistor.hpp"
 
-// Defaults: ODrive v3.6 (NCP15XH103).
-struct TemperatureSensorConfig {
-  double resistance_25 = 10'000.0;   // ohm at 25 degC
-  double beta = 3434.0;              // K
-  double ground_resistor = 3'300.0;  // ohm
-};
+namespace kmax::simulation {
 
 class TemperatureSensor {
  public:
   enum class Wiring : std::uint8_t { intact, open, shorted };
   static constexpr double reference = 3.3;  // V
 
-  explicit TemperatureSensor(const TemperatureSensorConfig& config = {}) : config_(config) {}
+  explicit TemperatureSensor(const drivers::NtcThermistorConfig& config) : config_(config) {}
 
   // degC, -100 to 500. Throws std::invalid_argument.
   void set_temperature(double celsius) {
@@ -40,12 +35,13 @@ class TemperatureSensor {
   double pin_voltage() const {
     if (wiring_ == Wiring::open) return 0.0;
     if (wiring_ == Wiring::shorted) return reference;
-    const double ratio = std::exp(config_.beta * (1.0 / (celsius_ + 273.15) - 1.0 / 298.15));
-    return reference * config_.ground_resistor / (config_.ground_resistor + config_.resistance_25 * ratio);
+    const double ratio = std::exp(config_.beta_kelvin * (1.0 / (celsius_ + 273.15) - 1.0 / 298.15));
+    const double ground = config_.ground_resistor_ohm;
+    return reference * ground / (ground + config_.resistance_25_ohm * ratio);
   }
 
  private:
-  TemperatureSensorConfig config_;
+  drivers::NtcThermistorConfig config_;
   double celsius_ = 25.0;
   Wiring wiring_ = Wiring::intact;
 };

@@ -7,6 +7,7 @@
 namespace kmax::board::current_sensors_test {
 namespace {
 
+constexpr float shunt = 0.5e-3f;
 constexpr auto gain = drivers::CurrentSenseGain::x80;
 
 struct Sample {
@@ -34,7 +35,7 @@ class CurrentSensorsTest : public testing::Test {
   }
 
   SampleHold samples;
-  CurrentSensors sensors;
+  CurrentSensors sensors{shunt};
 };
 
 TEST_F(CurrentSensorsTest, EitherPhaseBeyondTheLinearCodesIsSaturated) {
@@ -86,9 +87,9 @@ TEST_F(CurrentSensorsTest, AnOffsetIsTrackedUntilItLeavesItsWindow) {
 
 }  // namespace
 TEST(CurrentSensors, OffsetsAreFoundAnewWheneverDrivingBeginsOrEnds) {
-  CurrentSensors sensors;
+  CurrentSensors sensors{shunt};
   sensors.restart_calibration(gain);
-  const float code = drivers::CurrentSense{{.gain = gain}}.ISR_amperes(2049);
+  const float code = drivers::CurrentSense{{.shunt_ohm = shunt, .gain = gain}}.ISR_amperes(2049);
   for (int ms = 0; ms < 2000; ++ms) sensors.track_offsets(2048, 2048, gain, false);
   for (const bool driven : {true, false}) {
     const std::uint32_t zero = driven ? 2060 : 2048;
@@ -99,13 +100,14 @@ TEST(CurrentSensors, OffsetsAreFoundAnewWheneverDrivingBeginsOrEnds) {
 }
 
 TEST(CurrentSensors, AStepThatIsNoZerosIsNotTakenInHoweverOftenDrivingBegins) {
-  CurrentSensors sensors;
+  CurrentSensors sensors{shunt};
   sensors.restart_calibration(gain);
   for (int n = 0; n < 10; ++n) {
     for (const bool driven : {true, false}) {
       const std::uint32_t code = driven ? 2108 : 2048;
       for (int ms = 0; ms < 250; ++ms) sensors.track_offsets(2048, code, gain, driven);
-      const float taken = sensors.offset_c() / drivers::CurrentSense{{.gain = gain}}.ISR_amperes(2049);
+      const float taken =
+          sensors.offset_c() / drivers::CurrentSense{{.shunt_ohm = shunt, .gain = gain}}.ISR_amperes(2049);
       ASSERT_LE(taken, 16.5f) << n << ", with what was left of the time before";
     }
   }

@@ -3,11 +3,23 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <type_traits>
 
 #include "tests/drivers/fake_register.hpp"
 
 namespace kmax::drivers::stm32f4::current_sampling_test {
 
+constexpr CurrentSamplingConfig wiring{.axes = {{{10, 11}, {13, 12}}},
+                                       .supply = 6,
+                                       .temperatures = {15, 4},
+                                       .current_sampling_code = 0,
+                                       .slow_sampling_code = 2};
+template <typename Field>
+CurrentSamplingConfig with(Field CurrentSamplingConfig::*field, std::type_identity_t<Field> value) {
+  CurrentSamplingConfig config = wiring;
+  config.*field = value;
+  return config;
+}
 constexpr std::uint32_t apb2 = 84'000'000;
 constexpr std::uint32_t jeoc = 1U << 2, jstrt = 1U << 3;
 
@@ -31,7 +43,7 @@ struct FakeCommon {
 };
 
 struct Board {
-  explicit Board(const CurrentSamplingConfig& config = {}) : sampling{adc1, adc2, adc3, common, config} {}
+  explicit Board(const CurrentSamplingConfig& config = wiring) : sampling{adc1, adc2, adc3, common, config} {}
   FakeAdc adc1, adc2, adc3;
   FakeCommon common;
   CurrentSampling<FakeAdc, FakeCommon> sampling;
@@ -100,14 +112,15 @@ TEST(CurrentSampling, RefusesWhatCannotWorkAndTouchesNothing) {
     EXPECT_TRUE(configured || (board.common.ccr.writes.empty() && board.adc1.cr2.writes.empty()));
     return !configured;
   };
-  EXPECT_FALSE(refused({}, 144'000'000));
-  EXPECT_TRUE(refused({}, 144'000'001)) << "more than 36 MHz after /4";
-  EXPECT_TRUE(refused({.axes = {{{10, 4}, {13, 12}}}}, apb2)) << "ADC3 has no channel 4 here";
-  EXPECT_TRUE(refused({.axes = {{{10, 11}, {13, 15}}}}, apb2));
-  EXPECT_FALSE(refused({.axes = {{{4, 11}, {13, 12}}}}, apb2)) << "ADC2 has";
-  EXPECT_TRUE(refused({.supply = 16}, apb2));
-  EXPECT_TRUE(refused({.current_sampling_code = 8}, apb2));
-  EXPECT_TRUE(refused({.slow_sampling_code = 8}, apb2));
+  EXPECT_FALSE(refused(wiring, 144'000'000));
+  EXPECT_TRUE(refused(wiring, 144'000'001)) << "more than 36 MHz after /4";
+  using Config = CurrentSamplingConfig;
+  EXPECT_TRUE(refused(with(&Config::axes, {{{10, 4}, {13, 12}}}), apb2)) << "ADC3 has no channel 4 here";
+  EXPECT_TRUE(refused(with(&Config::axes, {{{10, 11}, {13, 15}}}), apb2));
+  EXPECT_FALSE(refused(with(&Config::axes, {{{4, 11}, {13, 12}}}), apb2)) << "ADC2 has";
+  EXPECT_TRUE(refused(with(&Config::supply, 16), apb2));
+  EXPECT_TRUE(refused(with(&Config::current_sampling_code, 8), apb2));
+  EXPECT_TRUE(refused(with(&Config::slow_sampling_code, 8), apb2));
 }
 
 // Each converter has two results: the axis asked for, and the other one while no current passes its shunts.
@@ -248,13 +261,6 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   }
   EXPECT_EQ(sample.supply, 1111) << "the last complete sequence";
   EXPECT_EQ(sample.slow_age, 255U);
-}
-
-TEST(CurrentSamplingConfig, ItsDefaults) {
-  const CurrentSamplingConfig defaults;
-  EXPECT_EQ(defaults.supply, 6u);
-  EXPECT_EQ(defaults.current_sampling_code, 0u);
-  EXPECT_EQ(defaults.slow_sampling_code, 2u);
 }
 
 TEST(CurrentSample, ItsDefaults) {

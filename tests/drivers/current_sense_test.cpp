@@ -11,6 +11,9 @@
 
 namespace kmax::drivers::current_sense_test {
 
+constexpr float shunt = 0.0005F;
+constexpr CurrentSenseConfig at_40{.shunt_ohm = shunt, .gain = CurrentSenseGain::x40};
+
 float amperes_per_code(const CurrentSense& sense) {
   return sense.ISR_amperes(2049) - sense.ISR_amperes(2048);
 }
@@ -23,7 +26,7 @@ TEST(CurrentSense, RangeAndResolutionOfEachGain) {
   };
   for (const Row& row : {Row{CurrentSenseGain::x10, 161.13, 270}, Row{CurrentSenseGain::x20, 80.57, 135},
                          Row{CurrentSenseGain::x40, 40.28, 67.5}, Row{CurrentSenseGain::x80, 20.14, 33.75}}) {
-    const CurrentSense sense{{.gain = row.gain}};
+    const CurrentSense sense{{.shunt_ohm = shunt, .gain = row.gain}};
     EXPECT_NEAR(1000.0 * static_cast<double>(amperes_per_code(sense)), row.milliampere_per_code,
                 0.01 * row.milliampere_per_code / 100);
     EXPECT_NEAR(static_cast<double>(sense.range()), row.range, 0.002 * row.range);
@@ -31,17 +34,17 @@ TEST(CurrentSense, RangeAndResolutionOfEachGain) {
 }
 
 TEST(CurrentSense, AboveTheMiddleFlowsIntoTheMotor) {
-  const CurrentSense sense;
+  const CurrentSense sense{at_40};
   EXPECT_EQ(sense.ISR_amperes(2048), 0.0F);
   EXPECT_GT(sense.ISR_amperes(2049), 0.0F);
   EXPECT_LT(sense.ISR_amperes(2047), 0.0F);
 }
 
 TEST(CurrentSense, AnOffsetInAmperesIsThatOfItsCodes) {
-  const CurrentSense sense;
+  const CurrentSense sense{at_40};
   EXPECT_EQ(sense.offset(), 2048.0F);
   EXPECT_EQ(sense.offset_amperes(), 0.0F);
-  CurrentSense moved;
+  CurrentSense moved{at_40};
   moved.track_offset(2058, 0);
   EXPECT_EQ(moved.offset(), 2048.0F + 10.0F / 4.0F);
   EXPECT_FLOAT_EQ(moved.offset_amperes(), 2.5F * amperes_per_code(moved));
@@ -57,7 +60,7 @@ RC_GTEST_PROP(CurrentSense, InvertsTheAnalogChain, ()) {
   const double volt = 1.65 + offset_volt + factor * current;
   const auto code = static_cast<std::uint16_t>(std::lround(volt / 3.3 * 4096));
 
-  CurrentSense sense{{.gain = gain}};
+  CurrentSense sense{{.shunt_ohm = shunt, .gain = gain}};
   sense.set_offset(static_cast<float>(2048 + offset_volt / 3.3 * 4096));
   RC_ASSERT(!sense.ISR_saturated(code));
   const double half_code = 0.501 * static_cast<double>(amperes_per_code(sense));
@@ -65,7 +68,7 @@ RC_GTEST_PROP(CurrentSense, InvertsTheAnalogChain, ()) {
 }
 
 TEST(CurrentSense, SaturatedOutsideTheLinearWindow) {
-  const CurrentSense sense;
+  const CurrentSense sense{at_40};
   using Code = std::uint16_t;
   for (const Code code : {Code{0}, Code{1}, Code{372}, Code{3724}, Code{4094}, Code{4095}})
     EXPECT_TRUE(sense.ISR_saturated(code)) << code;
@@ -73,7 +76,7 @@ TEST(CurrentSense, SaturatedOutsideTheLinearWindow) {
 }
 
 TEST(CurrentSense, OffsetNarrowsTheRangeOnOneSide) {
-  CurrentSense sense;
+  CurrentSense sense{at_40};
   const float centred = sense.range();
   sense.set_offset(2148.0F);
   EXPECT_NEAR(sense.range(), centred - 100 * amperes_per_code(sense), 0.01F * centred);
@@ -82,7 +85,7 @@ TEST(CurrentSense, OffsetNarrowsTheRangeOnOneSide) {
 }
 
 TEST(CurrentSense, TracksAStepInMillisecondsAndTheTemperatureInQuarters) {
-  CurrentSense sense;
+  CurrentSense sense{at_40};
   for (unsigned after = 0; after < 20; ++after) sense.track_offset(2058, after);
   EXPECT_NEAR(sense.offset(), 2058.0F - 10.0F * 3.0F / 23.0F, 0.01F) << "3 / (n + 3) of the step is left";
   for (unsigned after = 20; after < 300; ++after) sense.track_offset(2058, after);
@@ -94,7 +97,7 @@ TEST(CurrentSense, TracksAStepInMillisecondsAndTheTemperatureInQuarters) {
 
 TEST(CurrentSense, WhatDrivingMovesIsNoMoreThanSixteenCodesWhateverIsShown) {
   for (const float sign : {1.0F, -1.0F}) {
-    CurrentSense sense;
+    CurrentSense sense{at_40};
     sense.set_offset(2100.0F);
     const auto code = static_cast<std::uint32_t>(2100.0F + sign * 60.0F);
     for (unsigned after = 0; after < 252; ++after) {
@@ -112,7 +115,7 @@ TEST(CurrentSense, WhatDrivingMovesIsNoMoreThanSixteenCodesWhateverIsShown) {
 }
 
 TEST(CurrentSense, ACalibrationJustBehindDrivingMovesTheBound) {
-  CurrentSense sense;
+  CurrentSense sense{at_40};
   sense.track_offset(2048, 0);
   sense.set_offset(2148.0F);
   sense.track_offset(2148, 1);
@@ -137,19 +140,19 @@ TEST(OffsetCalibration, TakesExactlyItsSamples) {
 }
 
 TEST(CurrentSense, TheGainIsTheLargestThatReadsTheCurrent) {
-  EXPECT_EQ(gain_for_current(0.0F), CurrentSenseGain::x80);
+  EXPECT_EQ(gain_for_current(0.0F, shunt), CurrentSenseGain::x80);
   for (const auto gain : {CurrentSenseGain::x80, CurrentSenseGain::x40, CurrentSenseGain::x20}) {
-    CurrentSense worst{{.gain = gain}};
+    CurrentSense worst{{.shunt_ohm = shunt, .gain = gain}};
     worst.set_offset(2048.0F + static_cast<float>(offset_window(gain)));
     const float range = worst.range();
     worst.set_offset(2048.0F - static_cast<float>(offset_window(gain)));
     EXPECT_GE(worst.range(), range);
-    EXPECT_EQ(gain_for_current(range), gain);
-    EXPECT_EQ(gain_for_current(range * 1.0001F),
+    EXPECT_EQ(gain_for_current(range, shunt), gain);
+    EXPECT_EQ(gain_for_current(range * 1.0001F, shunt),
               static_cast<CurrentSenseGain>(static_cast<unsigned>(gain) - 1));
   }
-  EXPECT_EQ(gain_for_current(1e6F), CurrentSenseGain::x10) << "beyond all of them";
-  EXPECT_EQ(gain_for_current(std::numeric_limits<float>::quiet_NaN()), CurrentSenseGain::x10);
+  EXPECT_EQ(gain_for_current(1e6F, shunt), CurrentSenseGain::x10) << "beyond all of them";
+  EXPECT_EQ(gain_for_current(std::numeric_limits<float>::quiet_NaN(), shunt), CurrentSenseGain::x10);
 }
 
 TEST(CurrentSense, TheWindowOfTheOffsetIsThatOfTheAmplifiersInput) {
@@ -169,7 +172,7 @@ RC_GTEST_PROP(CurrentSense, TracksNoFurtherThanItsCodesAndNoFasterThanItMay, ())
   auto after = *rc::gen::element(0U, 3U, 251U, 252U, 65'535U, 0xFFFF'FFFFU);
   const auto codes = *rc::gen::nonEmpty(
       rc::gen::container<std::vector<std::uint16_t>>(rc::gen::inRange<std::uint16_t>(0, 4096)));
-  CurrentSense sense;
+  CurrentSense sense{at_40};
   sense.set_offset(first);
   float low = first, high = first;
   for (const std::uint16_t code : codes) {
@@ -230,15 +233,6 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
   const double mean = std::accumulate(codes.begin(), codes.end(), 0.0) / static_cast<double>(codes.size());
   RC_ASSERT(calibration.result() == OffsetResult::accepted);
   RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
-}
-
-TEST(CurrentSenseConfig, ItsDefaults) {
-  const CurrentSenseConfig defaults;
-  EXPECT_EQ(defaults.shunt_ohm, 0.0005F);
-  EXPECT_EQ(defaults.gain, CurrentSenseGain::x40);
-  EXPECT_EQ(defaults.reference_volt, 3.3F);
-  EXPECT_EQ(defaults.lowest_linear_code, 373u);
-  EXPECT_EQ(defaults.highest_linear_code, 3723u);
 }
 
 TEST(OffsetCalibrationConfig, ItsDefaults) {

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "board/odrive_v3/description.hpp"
+
 namespace kmax::drivers::ntc_thermistor_test {
 
-constexpr NtcThermistor board_ntc{};
+constexpr NtcThermistorConfig board_config = board::odrive_v3::description.thermistor;
+constexpr NtcThermistor board_ntc{board_config};
 
 double exact_celsius(double code) {
   const double resistance = 3300.0 * (4096.0 / code - 1.0);
@@ -67,7 +70,11 @@ TEST(NtcThermistor, OpenAndShorted) {
 }
 
 TEST(NtcThermistor, CodesBeyondTheConverterReadAsItsLast) {
-  static constexpr NtcThermistor whole{{.shorted_above = 0xFFFF}};
+  static constexpr NtcThermistor whole{[] {
+    NtcThermistorConfig config = board_config;
+    config.shorted_above = 0xFFFF;
+    return config;
+  }()};
   for (const std::uint16_t code : {std::uint16_t{4096}, std::uint16_t{0xFFFF}})
     EXPECT_EQ(whole.read(code).celsius, whole.read(4095).celsius) << code;
 }
@@ -82,22 +89,16 @@ TEST(NtcThermistor, StatedStepsPerCode) {
 }
 
 TEST(NtcThermistor, OtherPartsAndResistors) {
-  static constexpr NtcThermistor other{
-      {.resistance_25_ohm = 47'000.0, .beta_kelvin = 4050.0, .ground_resistor_ohm = 10'000.0}};
+  static constexpr NtcThermistor other{{.resistance_25_ohm = 47'000.0,
+                                        .beta_kelvin = 4050.0,
+                                        .ground_resistor_ohm = 10'000.0,
+                                        .open_below = 48,
+                                        .shorted_above = 3936}};
   for (const double celsius : {0.0, 25.0, 60.0, 90.0}) {
     const double resistance = 47'000.0 * std::exp(4050.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15));
     const auto code = static_cast<std::uint16_t>(std::lround(4096.0 * 10'000.0 / (10'000.0 + resistance)));
     EXPECT_NEAR(static_cast<double>(other.read(code).celsius), celsius, 0.1) << celsius;
   }
-}
-
-TEST(NtcThermistorConfig, ItsDefaults) {
-  const NtcThermistorConfig defaults{};
-  EXPECT_EQ(defaults.resistance_25_ohm, 10'000.0);
-  EXPECT_EQ(defaults.beta_kelvin, 3434.0);
-  EXPECT_EQ(defaults.ground_resistor_ohm, 3'300.0);
-  EXPECT_EQ(defaults.open_below, 48);
-  EXPECT_EQ(defaults.shorted_above, 3936);
 }
 
 }  // namespace kmax::drivers::ntc_thermistor_test

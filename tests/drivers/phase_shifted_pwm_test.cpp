@@ -8,6 +8,9 @@
 
 namespace kmax::drivers::stm32f4::phase_shifted_pwm_test {
 
+constexpr ThreePhasePwmConfig typical{
+    .half_period_ticks = 4200, .dead_time_code = 21, .minimum_low_ticks = 252};
+
 struct Pair {
   Pair() {
     // The part of UG that the driver looks at: 0, or ARR when the direction is down.
@@ -22,7 +25,7 @@ struct Pair {
 
 TEST(StartPhaseShifted, StopsBothWhenTheFollowerDoesNotFollow) {
   Pair pair;
-  ThreePhasePwm<FakeTimer> leader{pair.leader_timer}, follower{pair.follower_timer};
+  ThreePhasePwm<FakeTimer> leader{pair.leader_timer, typical}, follower{pair.follower_timer, typical};
   ASSERT_TRUE(leader.configure() && follower.configure());
   EXPECT_FALSE(start_phase_shifted(leader, follower));
   EXPECT_FALSE(leader.running());
@@ -31,8 +34,7 @@ TEST(StartPhaseShifted, StopsBothWhenTheFollowerDoesNotFollow) {
 
 TEST(StartPhaseShifted, RefusesDifferentPeriodsAndDisarms) {
   Pair pair;
-  ThreePhasePwm<FakeTimer> leader{pair.leader_timer},
-      follower{pair.follower_timer, {.half_period_ticks = 4199}};
+  ThreePhasePwm<FakeTimer> leader{pair.leader_timer, typical}, follower{pair.follower_timer, {4199, 21, 252}};
   ASSERT_TRUE(leader.configure() && follower.configure());
   pair.leader_timer.bdtr.value |= 1U << 15;
   pair.follower_timer.bdtr.value |= 1U << 15;
@@ -44,7 +46,7 @@ TEST(StartPhaseShifted, RefusesDifferentPeriodsAndDisarms) {
 TEST(StartPhaseShifted, RefusesAFollowerThatDoesNotTakeTheDirection) {
   Pair pair;
   pair.follower_timer.cr1.on_read = [](std::uint32_t word) { return word & ~(1U << 4); };
-  ThreePhasePwm<FakeTimer> leader{pair.leader_timer}, follower{pair.follower_timer};
+  ThreePhasePwm<FakeTimer> leader{pair.leader_timer, typical}, follower{pair.follower_timer, typical};
   ASSERT_TRUE(leader.configure() && follower.configure());
   EXPECT_FALSE(start_phase_shifted(leader, follower));
   EXPECT_FALSE(leader.running());
@@ -56,7 +58,7 @@ TEST(StartPhaseShifted, LeavesTheUpdateEventAsTriggerAndTheFollowerFree) {
   pair.leader_timer.cr1.on_write = [&](std::uint32_t word) {
     if ((word & 1U) != 0 && (pair.follower_timer.smcr.value & 7U) == 6) pair.follower_timer.cr1.value |= 1;
   };
-  ThreePhasePwm<FakeTimer> leader{pair.leader_timer}, follower{pair.follower_timer};
+  ThreePhasePwm<FakeTimer> leader{pair.leader_timer, typical}, follower{pair.follower_timer, typical};
   ASSERT_TRUE(leader.configure() && follower.configure());
   ASSERT_TRUE(start_phase_shifted(leader, follower));
   EXPECT_EQ(pair.leader_timer.cr2.value, 2U << 4);

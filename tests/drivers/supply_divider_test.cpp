@@ -5,27 +5,21 @@
 namespace kmax::drivers::supply_divider_test {
 
 TEST(SupplyDivider, FullScaleOfBothBoards) {
-  EXPECT_NEAR((SupplyDivider{{.ratio = 11.0F}}.volts(4095)), 36.29, 0.01);
-  EXPECT_NEAR((SupplyDivider{{.ratio = 19.0F}}.volts(4095)), 62.68, 0.01);
-  EXPECT_EQ(SupplyDivider{}.volts(0), 0.0F);
+  EXPECT_NEAR((SupplyDivider{11.0F}.volts(4095)), 36.29, 0.01);
+  EXPECT_NEAR((SupplyDivider{19.0F}.volts(4095)), 62.68, 0.01);
+  EXPECT_EQ(SupplyDivider{19.0F}.volts(0), 0.0F);
 }
 
 TEST(SupplyDivider, TwentyFourVoltsComeBack) {
   // 24 V / 11 = 2.1818 V at the tap.
-  const SupplyDivider divider{{.ratio = 11.0F}};
+  const SupplyDivider divider{11.0F};
   EXPECT_NEAR(divider.volts(2708), 24.0F, 0.5F * divider.volts(1));
 }
 
 TEST(SupplyDivider, OnlyTheLastCodeIsSaturated) {
-  const SupplyDivider divider;
+  const SupplyDivider divider{19.0F};
   EXPECT_FALSE(divider.saturated(4094));
   EXPECT_TRUE(divider.saturated(4095));
-}
-
-TEST(SupplyDividerConfig, ItsDefaults) {
-  const SupplyDividerConfig defaults;
-  EXPECT_EQ(defaults.ratio, 19.0F);
-  EXPECT_EQ(defaults.reference_volt, 3.3F);
 }
 
 }  // namespace kmax::drivers::supply_divider_test

@@ -13,6 +13,8 @@
 
 namespace kmax::drivers::stm32f4::three_phase_pwm_test {
 
+constexpr ThreePhasePwmConfig typical{
+    .half_period_ticks = 4200, .dead_time_code = 21, .minimum_low_ticks = 252};
 constexpr std::uint32_t moe = 1U << 15;
 // DTG 21, LOCK 2, OSSI, OSSR, BKE, BKP; AOE and MOE 0.
 constexpr std::uint32_t disarmed = 21U | 2U << 8 | 1U << 10 | 1U << 11 | 1U << 12 | 1U << 13;
@@ -26,7 +28,7 @@ TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
   timer.rcr = 3;
   timer.psc = 3;
   timer.sr = 0xFFFF;
-  ThreePhasePwm<> pwm{timer};
+  ThreePhasePwm<> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   EXPECT_EQ(timer.cr1, 1U << 2 | 3U << 5 | 1U << 7) << "URS, CMS = 3, ARPE, stopped";
   EXPECT_EQ(timer.cr2, 1U << 4) << "all idle levels 0, TRGO shows CEN";
@@ -47,9 +49,7 @@ TEST(ThreePhasePwm, ConfiguresCentreAlignedComplementaryPwm) {
 }
 
 struct Configured {
-  explicit Configured(const ThreePhasePwmConfig& config = {}) : pwm{timer, config} {
-    EXPECT_TRUE(pwm.configure());
-  }
+  Configured() : pwm{timer, typical} { EXPECT_TRUE(pwm.configure()); }
   TimerRegisters timer{};
   ThreePhasePwm<> pwm;
 };
@@ -61,7 +61,7 @@ TEST(ThreePhasePwm, OutputsAreOffBeforeAnythingElseIsTouched) {
   timer.cr1.on_write = [&](std::uint32_t) { order += '1'; };
   timer.ccer.on_write = [&](std::uint32_t) { order += 'e'; };
   timer.arr.on_write = [&](std::uint32_t) { order += 'a'; };
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   EXPECT_EQ(order.front(), 'b');
   EXPECT_EQ(order.back(), 'e') << "the legs come last";
@@ -72,7 +72,7 @@ TEST(ThreePhasePwm, IsSetUpInTheManualsOrder) {
   timer.cr1.value = 1U | 1U << 4 | 3U << 5;  // runs down, centre-aligned
   WriteOrder order;
   timer.add_to(order);
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   constexpr std::uint32_t loading = 1U << 2 | 1U << 7;
   EXPECT_EQ(order.all, (WriteOrder::Writes{{"bdtr", disarmed},
@@ -104,9 +104,9 @@ TEST(ThreePhasePwm, IsSetUpInTheManualsOrder) {
 
 TEST(ThreePhasePwm, RefusesImpossibleConfigurations) {
   for (const ThreePhasePwmConfig& config :
-       {ThreePhasePwmConfig{.half_period_ticks = 252}, ThreePhasePwmConfig{.minimum_low_ticks = 4200},
-        ThreePhasePwmConfig{.minimum_low_ticks = 21}, ThreePhasePwmConfig{.dead_time_code = 255},
-        ThreePhasePwmConfig{.dead_time_code = 0}}) {
+       {ThreePhasePwmConfig{252, 21, 252}, ThreePhasePwmConfig{4200, 21, 4200},
+        ThreePhasePwmConfig{4200, 21, 21}, ThreePhasePwmConfig{4200, 255, 252},
+        ThreePhasePwmConfig{4200, 0, 252}}) {
     TimerRegisters timer{};
     timer.bdtr = moe;
     ThreePhasePwm<> pwm{timer, config};
@@ -119,13 +119,13 @@ TEST(ThreePhasePwm, RefusesImpossibleConfigurations) {
 TEST(ThreePhasePwm, NoticesALockedBreakAndDeadTimeRegister) {
   FakeTimer timer;
   timer.bdtr.on_read = [](std::uint32_t) { return disarmed - 1; };
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   EXPECT_FALSE(pwm.configure());
 }
 
 TEST(ThreePhasePwm, DisarmIsOneStoreWithoutARead) {
   FakeTimer timer;
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   pwm.disarm();
   EXPECT_EQ(timer.bdtr.writes, std::vector<std::uint32_t>{disarmed}) << "before configure, too";
   EXPECT_EQ(timer.bdtr.reads, 0U);
@@ -133,7 +133,7 @@ TEST(ThreePhasePwm, DisarmIsOneStoreWithoutARead) {
 
 TEST(ThreePhasePwm, ArmIsOneStoreAndLooksWhetherItTook) {
   FakeTimer timer;
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   timer.bdtr.writes.clear();
   EXPECT_FALSE(pwm.arm()) << "the counter stands";
@@ -148,7 +148,7 @@ TEST(ThreePhasePwm, ArmIsOneStoreAndLooksWhetherItTook) {
 
 TEST(ThreePhasePwm, TellsABreakThatIsHeldAndTurnsItRound) {
   FakeTimer timer;
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   EXPECT_FALSE(pwm.break_is_held());
   timer.sr.on_read = [](std::uint32_t word) { return word | 1U << 7; };
@@ -194,7 +194,7 @@ TEST(ThreePhasePwm, NoVoltageIsTheMiddleOnAllLegs) {
 
 TEST(ThreePhasePwm, TheStepsOfAStartInStep) {
   FakeTimer timer;
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   EXPECT_FALSE(pwm.counting_down());
   pwm.load_counter(true);
@@ -217,7 +217,7 @@ TEST(ThreePhasePwm, TheStepsOfAStartInStep) {
 
 TEST(ThreePhasePwm, TellsThatTheTicksStayedAwaySinceItWasArmed) {
   FakeTimer timer;
-  ThreePhasePwm<FakeTimer> pwm{timer};
+  ThreePhasePwm<FakeTimer> pwm{timer, typical};
   ASSERT_TRUE(pwm.configure());
   EXPECT_FALSE(pwm.ISR_ticks_stayed_away());
   timer.sr.value = 1U << 4;
@@ -241,7 +241,7 @@ TEST(ThreePhasePwm, NotANumberLeavesTheDutyAlone) {
 RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
   TimerRegisters timer{};
   const auto half = *rc::gen::inRange<std::uint16_t>(300, 65535);
-  ThreePhasePwm<> pwm{timer, {.half_period_ticks = half}};
+  ThreePhasePwm<> pwm{timer, {half, 21, 252}};
   RC_ASSERT(pwm.configure());
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float value :
@@ -254,19 +254,6 @@ RC_GTEST_PROP(ThreePhasePwm, AnyNumberKeepsTheWindowOpen, (float duty)) {
     const double error = static_cast<double>(half - timer.ccr[0]) - limited * half;
     RC_ASSERT(error <= 0.51 && error >= -0.51);
   }
-}
-
-TEST(ThreePhasePwmConfig, ItsDefaults) {
-  const ThreePhasePwmConfig defaults;
-  EXPECT_EQ(defaults.half_period_ticks, 4200u);
-  EXPECT_EQ(defaults.minimum_low_ticks, 252u);
-}
-
-TEST(PwmLegs, ItsDefaults) {
-  const PwmLegs defaults;
-  EXPECT_TRUE(defaults.a);
-  EXPECT_TRUE(defaults.b);
-  EXPECT_TRUE(defaults.c);
 }
 
 }  // namespace kmax::drivers::stm32f4::three_phase_pwm_test

@@ -133,7 +133,7 @@ class Bus {
   FakeController wire_;
   FakeLink link_;
   FakeClock clock_;
-  Behaviour functions_{wire_, link_, clock_};
+  Behaviour functions_{wire_, link_, clock_, 42'000'000};
   Device<FakeController, Behaviour> device_{wire_, functions_, {}};
   std::array<std::uint8_t, 256> reply_{};
   bool replying_ = false;

@@ -54,6 +54,23 @@ class MadeUpBridge {
 /// Bridges, converters and encoders, with a motor of 1 ohm and 1 mH on each (board::MotorHardware).
 class MadeUpHardware {
  public:
+  static constexpr BoardDescription description{
+      .name = "made_up",
+      .core_clock_hz = 100'000'000,
+      .timer_clock_hz = 40'000'000,
+      .half_period_ticks = 1000,
+      .dead_time_ticks = 5,
+      .minimum_low_ticks = 50,
+      .modulation_limit = {0.88f, 0.88f, 0.88f, 0.88f},
+      .shunt = 0.5e-3,
+      .thermistor = {.resistance_25_ohm = 10e3,
+                     .beta_kelvin = 3434.0,
+                     .ground_resistor_ohm = 3.3e3,
+                     .open_below = 48,
+                     .shorted_above = 3936},
+      .gate_driver_supply_minimum = 0.0,
+      .brake_pulse = 0.0,
+  };
   static constexpr float supply_ratio = 10.0f;
   static constexpr double supply = 24.0;  ///< V
 
@@ -66,14 +83,13 @@ class MadeUpHardware {
   static constexpr bool has(std::size_t) { return true; }
   MadeUpBridge& bridge(std::size_t axis) { return bridges_[axis]; }
   const Sample& ISR_sample(std::size_t axis) {
-    const double codes_per_ampere = gain_ * 0.0005 * 4096.0 / 3.3;
+    const double codes_per_ampere = gain_ * description.shunt * 4096.0 / 3.3;
     const auto code = static_cast<int>(std::lround(currents[axis] * codes_per_ampere));
     samples_[axis].phase_b = static_cast<std::uint16_t>(2048 + code);
     samples_[axis].phase_c = static_cast<std::uint16_t>(2048 - code);
     return samples_[axis];
   }
   Sample zero_current(std::size_t) const { return {}; }
-  float modulation_limit(drivers::CurrentSenseGain) const { return 0.88f; }
   std::uint16_t ISR_counter(std::size_t axis) const { return counters[axis]; }
   bool ISR_index_line(std::size_t) const { return false; }
   void set_brake(bool on) { brake_on = on; }

@@ -1,6 +1,6 @@
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 
-#include "drivers/stm32f4/current_sampling.hpp"
+#include "board/odrive_v3/description.hpp"
 
 namespace kmax::virtual_board {
 
@@ -62,7 +62,7 @@ double SceneWorld::current_pin(std::size_t axis, CurrentSensor::Channel channel)
 
 double SceneWorld::analogue(unsigned channel, BoardTime now) {
   advance_to(now);
-  constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
+  constexpr const drivers::stm32f4::CurrentSamplingConfig& wiring = board::odrive_v3::sampling_config;
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (channel == wiring.axes[axis].b) return current_pin(axis, CurrentSensor::Channel::b);
     if (channel == wiring.axes[axis].c) return current_pin(axis, CurrentSensor::Channel::c);

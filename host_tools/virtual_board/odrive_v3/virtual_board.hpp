@@ -227,8 +227,8 @@ class VirtualBoard {
   ExtiModel exti_{syscfg_, core_.nvic};
   std::array<AdvancedTimerModel, 2> pwm_{AdvancedTimerModel{AdvancedTimer::tim1, clocks_},
                                          AdvancedTimerModel{AdvancedTimer::tim8, clocks_}};
-  std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3},
-                                             GeneralTimerModel{GeneralTimer::tim4}};
+  std::array<GeneralTimerModel, 2> encoders_{GeneralTimerModel{GeneralTimer::tim3, clocks_},
+                                             GeneralTimerModel{GeneralTimer::tim4, clocks_}};
   OnePulseTimerModel brake_timer_{clocks_};
   DmaModel dma2_{bus_};
   DbgmcuModel dbgmcu_;

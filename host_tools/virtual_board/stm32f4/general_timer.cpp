@@ -34,8 +34,9 @@ constexpr std::uint32_t both_inputs = timer_ccmr::Selection<1>::bits(timer_ccmr:
 
 }  // namespace
 
-GeneralTimerModel::GeneralTimerModel(GeneralTimer unit)
+GeneralTimerModel::GeneralTimerModel(GeneralTimer unit, const BoardClocks& clocks)
     : RegisterBlock(units.at(static_cast<std::size_t>(unit)).name, registers()),
+      clocks_(clocks),
       longest_(units.at(static_cast<std::size_t>(unit)).longest) {
   reset(0);
 }
@@ -69,7 +70,7 @@ double GeneralTimerModel::input_filter() const {
                                                         {32, 6},
                                                         {32, 8}}};
   const auto [interval, samples] = filters.at(timer_ccmr::InputFilter<1>::of(ccmr_));
-  return interval * samples / 84e6;
+  return interval * samples * seconds(clocks_.apb1_timer);
 }
 
 void GeneralTimerModel::set_encoder_count(std::int64_t edges) {

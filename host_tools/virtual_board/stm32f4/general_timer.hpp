@@ -20,14 +20,14 @@ enum class GeneralTimer : std::uint8_t { tim2, tim3, tim4, tim5 };
 /// a prescaler, interrupts and DMA, capture and compare channels, changing the inputs while counting.
 class GeneralTimerModel final : public RegisterBlock<GeneralTimerModel> {
  public:
-  explicit GeneralTimerModel(GeneralTimer unit);
+  GeneralTimerModel(GeneralTimer unit, const BoardClocks& clocks);
 
   void reset(BoardTime now) override;
 
   /// Edges of A and B together since some origin of the world's choice, upwards when A leads. The counter
   /// follows the changes while it is in encoder mode and runs. Its cost does not depend on how far it moved.
   void set_encoder_count(std::int64_t edges);
-  /// s, at the timers' 84 MHz: shorter pulses of A and B are not counted.
+  /// s: shorter pulses of A and B are not counted.
   double input_filter() const;
 
  private:
@@ -42,6 +42,7 @@ class GeneralTimerModel final : public RegisterBlock<GeneralTimerModel> {
   void write_arr(const Access& access, std::uint32_t value);
   bool encoder_mode() const;
 
+  const BoardClocks& clocks_;
   std::uint32_t longest_;  // greatest count
   std::uint32_t cr1_ = 0;  // without CEN and DIR
   std::uint32_t smcr_ = 0, sr_ = 0, ccmr_ = 0, ccer_ = 0, arr_ = 0, count_ = 0;

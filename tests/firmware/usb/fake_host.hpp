@@ -119,7 +119,7 @@ struct DeviceAtHost {
   Link& link;
   FakeController wire;
   FakeClock clock;
-  Behaviour functions{wire, link, clock};
+  Behaviour functions{wire, link, clock, 42'000'000};
   Device<FakeController, Behaviour> device{
       wire, functions, {.serial_number = 0x1234'ABCD, .release = 0x0102}};
   FakeHost<Device<FakeController, Behaviour>> host{wire, device};

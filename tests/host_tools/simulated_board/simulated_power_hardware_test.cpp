@@ -203,7 +203,8 @@ TEST(SimulatedPowerHardware, TheAmplifiersSettleWithinWhatTheBoardAllowsTheDutie
                           drivers::CurrentSenseGain::x40, drivers::CurrentSenseGain::x80}) {
     constexpr const board::BoardDescription& board = board::odrive_v3::description;
     const simulation::CurrentSensor sensor({.gain = static_cast<double>(drivers::gain_factor(gain))});
-    const double duty = 0.5 + 0.5 * static_cast<double>(SimulatedPowerHardware::modulation_limit(gain));
+    const double duty =
+        0.5 + 0.5 * static_cast<double>(board.modulation_limit[static_cast<std::size_t>(gain)]);
     EXPECT_LE(duty, board.largest_duty());
     const double left = sensor.left_after(0.5 * (1.0 - duty) / board.pwm_hz() - board.dead_time());
     EXPECT_LT(left, 0.0135) << drivers::gain_factor(gain);

@@ -5,7 +5,7 @@
 #include <bit>
 #include <random>
 
-#include "drivers/stm32f4/current_sampling.hpp"
+#include "board/odrive_v3/description.hpp"
 #include "tests/image/parity/axis_tick_calls.hpp"
 
 namespace kmax::tests::parity_test {
@@ -77,7 +77,7 @@ class RandomWorld final : public EmptyWorld {
     if (!quiet && channel == 6) return (22.0 + uniform(0, 3.4)) / 11.0;
     if (quiet || channel == 15 || channel == 4 || channel == 5) return EmptyWorld::analogue(channel, now);
     // The currents of B and C nearly add up to nothing, so that their sum does not end every run at once.
-    constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
+    constexpr const auto& wiring = board::odrive_v3::sampling_config;
     for (std::size_t axis = 0; axis < wiring.axes.size(); ++axis) {
       const bool b = channel == wiring.axes[axis].b, c = channel == wiring.axes[axis].c;
       // No current passes the shunts of the other axis, whose zero is looked at.

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/stm32f4/current_sampling.hpp"
+#include "board/odrive_v3/description.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
 
@@ -16,7 +16,7 @@ namespace kmax::virtual_board::scene_world_test {
 
 using simulation::Defect;
 
-constexpr drivers::stm32f4::CurrentSamplingConfig wiring{};
+constexpr const auto& wiring = board::odrive_v3::sampling_config;
 constexpr BoardTime half_tick = units_per_second / 40'000;
 
 /// Of every tick: the codes of B, C and the supply, the edges, the serial encoder's angle.

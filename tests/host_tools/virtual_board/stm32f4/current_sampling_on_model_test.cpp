@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "board/odrive_v3/description.hpp"
 #include "drivers/stm32f4/current_sampling.hpp"
 #include "drivers/stm32f4/interrupts.hpp"
 #include "host_tools/virtual_board/stm32f4/adc.hpp"
@@ -55,7 +56,8 @@ struct Board : testing::ModelBench {
   AdcOnModel adc2 = block_on_model<AdcOnModel>(*this, model, adc_stride);
   AdcOnModel adc3 = block_on_model<AdcOnModel>(*this, model, 2 * adc_stride);
   CommonOnModel common = block_on_model<CommonOnModel>(*this, model, 3 * adc_stride);
-  drivers::stm32f4::CurrentSampling<AdcOnModel, CommonOnModel> sampling{adc1, adc2, adc3, common};
+  drivers::stm32f4::CurrentSampling<AdcOnModel, CommonOnModel> sampling{adc1, adc2, adc3, common,
+                                                                        board::odrive_v3::sampling_config};
 };
 
 void expect_sample_of(const Board& board, const CurrentSample& sample, unsigned n) {

@@ -20,7 +20,7 @@ constexpr std::uint32_t cen = 1U << 0, urs = 1U << 2, dir = 1U << 4, arpe = 1U <
 constexpr std::uint32_t cc1p = 1U << 1, cc2p = 1U << 5;
 
 struct Bench : testing::ModelBench {
-  explicit Bench(GeneralTimer unit = GeneralTimer::tim3) : ModelBench({&model}, 500), model(unit) {}
+  explicit Bench(GeneralTimer unit = GeneralTimer::tim3) : ModelBench({&model}, 500), model(unit, clocks) {}
   void encoder(std::uint32_t polarity = 0) {
     timer.ccmr[0] = 0x4141;
     timer.ccer = polarity;

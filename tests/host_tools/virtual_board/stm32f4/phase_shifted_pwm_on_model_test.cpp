@@ -18,11 +18,13 @@ using drivers::stm32f4::ThreePhasePwm;
 using drivers::stm32f4::ThreePhasePwmConfig;
 using testing::TimerOnModel;
 
+constexpr ThreePhasePwmConfig typical{
+    .half_period_ticks = 4200, .dead_time_code = 21, .minimum_low_ticks = 252};
 constexpr BoardTime tick = 2;
 constexpr BoardTime half_period = 4200 * tick;
 
 struct Board : testing::ModelBench {
-  explicit Board(const ThreePhasePwmConfig& config = {})
+  explicit Board(const ThreePhasePwmConfig& config = typical)
       : ModelBench({&tim1, &tim8}, 12345), pwm1(timer1, config), pwm8(timer8, config) {
     clocks.apb2_timer = tick;
     tim1.on_trigger_output([this](BoardTime at) {
@@ -137,8 +139,9 @@ TEST(PhaseShiftedPwmOnModel, ClockFailureDisarmsAndArmingAgainIsSoftwares) {
 }
 
 TEST(PhaseShiftedPwmOnModel, BrushedMotorLeavesLegAOff) {
-  Board board({.legs = {.a = false}});
+  Board board;
   ASSERT_TRUE(board.start());
+  ASSERT_TRUE(board.pwm1.enable_legs({.a = false}));
   ASSERT_TRUE(board.pwm1.arm());
   EXPECT_FALSE(board.tim1.outputs()[0].enabled);
   EXPECT_TRUE(board.tim1.outputs()[1].enabled);
@@ -150,7 +153,7 @@ TEST(PhaseShiftedPwmOnModel, LockProtectsTheDeadTime) {
   ASSERT_TRUE(board.start());
   board.timer1.bdtr = 0;
   EXPECT_EQ(static_cast<std::uint32_t>(board.timer1.bdtr) & 0xFFU, 21U);
-  ThreePhasePwm<TimerOnModel> other{board.timer1, {.dead_time_code = 40}};
+  ThreePhasePwm<TimerOnModel> other{board.timer1, {4200, 40, 252}};
   EXPECT_FALSE(other.configure()) << "another dead time needs a reset";
   EXPECT_TRUE(board.pwm1.configure());
   board.tim1.reset(board.now);
@@ -160,7 +163,7 @@ TEST(PhaseShiftedPwmOnModel, LockProtectsTheDeadTime) {
 RC_GTEST_PROP(PhaseShiftedPwmOnModel, OutputIsTheDutyThatWasSet, ()) {
   const auto half = *rc::gen::inRange<std::uint16_t>(300, 60000);
   const auto high = *rc::gen::inRange<std::uint16_t>(0, 65535);
-  Board board({.half_period_ticks = half});
+  Board board({half, 21, 252});
   RC_ASSERT(board.start());
   RC_ASSERT(board.pwm1.arm());
   board.pwm1.ISR_set_ticks({high, 0, 0});
