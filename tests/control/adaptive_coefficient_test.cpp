@@ -195,17 +195,4 @@ TEST(AdaptiveCoefficient, ANotANumberDoesNotPoisonTheMemory) {
   }
 }
 
-TEST(AdaptiveCoefficientConfig, ItsDefaults) {
-  const AdaptiveCoefficientConfig<double> defaults;
-  EXPECT_EQ(defaults.gain, 2.4);
-  EXPECT_EQ(defaults.offset, 0.8);
-  EXPECT_EQ(defaults.velocity_max, 2.4);
-  EXPECT_EQ(defaults.force_min, 0.8);
-  EXPECT_EQ(defaults.force_max, 2.0);
-  EXPECT_EQ(defaults.hold_time, 1.2);
-  EXPECT_EQ(defaults.relation, AdaptiveRelation::linear);
-  EXPECT_EQ(defaults.velocity, AdaptiveVelocity::approach);
-  EXPECT_EQ(defaults.mode, AdaptiveMode::instant);
-}
-
 }  // namespace kmax::control::adaptive_coefficient_test

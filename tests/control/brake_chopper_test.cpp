@@ -38,16 +38,4 @@ TEST(BrakeChopper, TakesAVoltageThatIsNoNumberAsLow) {
   EXPECT_EQ(ticks_on(chopper, fitted, std::nanf("")), 0);
 }
 
-TEST(BrakeChopperConfig, ItsDefaults) {
-  const BrakeChopperConfig defaults;
-  EXPECT_EQ(defaults.on_voltage, 0.0f);
-  EXPECT_EQ(defaults.hysteresis, 0.5f);
-}
-
-TEST(BrakeChopperCoefficients, ItsDefaults) {
-  const BrakeChopper::Coefficients defaults{};
-  EXPECT_EQ(defaults.on_voltage, 0.0f);
-  EXPECT_EQ(defaults.off_voltage, 0.0f);
-}
-
 }  // namespace kmax::control::brake_chopper_test

@@ -64,11 +64,4 @@ TEST(DamperVelocity, AJumpOfAnySizeIsFinite) {
     EXPECT_TRUE(std::isfinite(damper.update(c, count))) << count;
 }
 
-TEST(DamperVelocityCoefficients, ItsDefaults) {
-  const DamperVelocity<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.window, 1u);
-  EXPECT_EQ(defaults.key, 0u);
-  EXPECT_EQ(defaults.scale, 0.0);
-}
-
 }  // namespace kmax::control::damper_velocity_test

@@ -257,22 +257,4 @@ TEST(DcCurrentController, ResetEmptiesTheIntegrator) {
   EXPECT_EQ(loop.controller.update(loop.c, 1.0, 1.0, 0.0, 24.0).voltage, 0.0);
 }
 
-TEST(DcCurrentControllerOutput, ItsDefaults) {
-  const DcCurrentController<double>::Output defaults{};
-  EXPECT_FALSE(defaults.saturated);
-  EXPECT_FALSE(defaults.not_finite);
-}
-
-TEST(DcCurrentControllerConfig, ItsDefaults) {
-  const DcCurrentControllerConfig<double> defaults;
-  EXPECT_EQ(defaults.resistance, 1.0);
-  EXPECT_EQ(defaults.inductance, 0.001);
-  EXPECT_EQ(defaults.torque_constant, 0.0);
-  EXPECT_EQ(defaults.bandwidth, 6283.185307);
-  EXPECT_EQ(defaults.modulation_limit, 0.95);
-  EXPECT_EQ(defaults.dead_time, 0.0);
-  EXPECT_EQ(defaults.dead_time_current, 0.1);
-  EXPECT_EQ(defaults.pwm_frequency, 20000.0);
-}
-
 }  // namespace kmax::control::dc_current_controller_test

@@ -66,12 +66,4 @@ TEST(DeadTimeCompensation, WhatMakesNoSenseSwitchesItOff) {
   EXPECT_EQ(off.share, 0.0);
 }
 
-TEST(DeadTimeCompensation, ItsDefaults) {
-  const DeadTimeCompensation<double> defaults{};
-  EXPECT_EQ(defaults.band, 1.0);
-  EXPECT_EQ(defaults.gain, 0.0);
-  EXPECT_EQ(defaults.share, 0.0);
-  EXPECT_FALSE(defaults.active);
-}
-
 }  // namespace kmax::control::dead_time_compensation_test

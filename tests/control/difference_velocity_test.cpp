@@ -37,9 +37,4 @@ RC_GTEST_PROP(DifferenceVelocity, EveryPairOfCountsGivesAFiniteValue,
   RC_ASSERT(value == 0.0F || (value > 0.0F) == (second > first));
 }
 
-TEST(DifferenceVelocityCoefficients, ItsDefaults) {
-  const DifferenceVelocity<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.scale, 0.0);
-}
-
 }  // namespace kmax::control::difference_velocity_test

@@ -515,24 +515,4 @@ TEST(FieldOrientedController, TheSupplyIsHalvedInMidStep) {
   }
 }
 
-TEST(FieldOrientedControllerConfig, ItsDefaults) {
-  const FieldOrientedControllerConfig<double> defaults;
-  EXPECT_EQ(defaults.resistance, 1.0);
-  EXPECT_EQ(defaults.inductance_d, 0.001);
-  EXPECT_EQ(defaults.inductance_q, 0.001);
-  EXPECT_EQ(defaults.torque_constant, 0.0);
-  EXPECT_EQ(defaults.pole_pairs, 1);
-  EXPECT_EQ(defaults.bandwidth, 6283.185307);
-  EXPECT_EQ(defaults.modulation_limit, 0.95);
-  EXPECT_EQ(defaults.dead_time, 0.0);
-  EXPECT_EQ(defaults.dead_time_current, 0.1);
-  EXPECT_EQ(defaults.pwm_frequency, 20000.0);
-}
-
-TEST(FieldOrientedControllerVerdict, ItsDefaults) {
-  const FieldOrientedController<double>::Verdict defaults{};
-  EXPECT_FALSE(defaults.saturated);
-  EXPECT_FALSE(defaults.not_finite);
-}
-
 }  // namespace kmax::control::field_oriented_controller_test

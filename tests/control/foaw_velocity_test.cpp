@@ -299,12 +299,4 @@ TEST(FoawVelocity, WindowsOutsideTheRangeAreTakenAsTheNearerLimit) {
   EXPECT_EQ(FoawVelocity<float>::prepare(16, 1.0F, 1.0F, 0).step, 1);
 }
 
-TEST(FoawVelocityCoefficients, ItsDefaults) {
-  const FoawVelocity<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.step, 1);
-  EXPECT_EQ(defaults.window, 1);
-  EXPECT_EQ(defaults.scale, 0.0);
-  EXPECT_EQ(defaults.per_sample, 0.0);
-}
-
 }  // namespace kmax::control::foaw_velocity_test

@@ -308,24 +308,4 @@ TEST(ForceCompensation, BeyondTheFrictionAHandleIsMoved) {
   EXPECT_GT(handle.position, 1e-5);
 }
 
-TEST(ForceCompensationConfig, ItsDefaults) {
-  const ForceCompensationConfig<double> defaults;
-  EXPECT_EQ(defaults.friction, 0.0);
-  EXPECT_EQ(defaults.friction_velocity, 0.02);
-  EXPECT_EQ(defaults.cogging_periods, 0u);
-  EXPECT_EQ(defaults.cogging_cosine_1, 0.0);
-  EXPECT_EQ(defaults.cogging_sine_1, 0.0);
-  EXPECT_EQ(defaults.cogging_cosine_2, 0.0);
-  EXPECT_EQ(defaults.cogging_sine_2, 0.0);
-  EXPECT_EQ(defaults.gravity_constant, 0.0);
-  EXPECT_EQ(defaults.gravity_cosine, 0.0);
-  EXPECT_EQ(defaults.gravity_sine, 0.0);
-  EXPECT_EQ(defaults.limit, 0.0);
-}
-
-TEST(ForceCompensationCoefficients, ItsDefaults) {
-  const ForceCompensation<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.cogging_periods, 0u);
-}
-
 }  // namespace kmax::control::force_compensation_test

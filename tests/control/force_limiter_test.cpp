@@ -97,19 +97,4 @@ TEST(ForceLimiter, NotFiniteGivesZeroAndTheSoftStartAgain) {
   }
 }
 
-TEST(ForceLimiterOutput, ItsDefaults) {
-  const ForceLimiter<double>::Output defaults{};
-  EXPECT_FALSE(defaults.limited);
-  EXPECT_FALSE(defaults.slew_limited);
-  EXPECT_FALSE(defaults.ramping);
-  EXPECT_FALSE(defaults.not_finite);
-}
-
-TEST(ForceLimiterConfig, ItsDefaults) {
-  const ForceLimiterConfig<double> defaults;
-  EXPECT_EQ(defaults.limit, 3.3);
-  EXPECT_EQ(defaults.slew_limit, 0.0);
-  EXPECT_EQ(defaults.ramp_time, 0.2);
-}
-
 }  // namespace kmax::control::force_limiter_test

@@ -117,16 +117,4 @@ RC_GTEST_PROP(GrowingStiffness, StaysBetweenTouchAndFullAndFloatFollowsDouble, (
   }
 }
 
-TEST(GrowingStiffnessConfig, ItsDefaults) {
-  const GrowingStiffnessConfig<double> defaults{};
-  EXPECT_EQ(defaults.touch_stiffness, 0.0);
-  EXPECT_EQ(defaults.growth_time, 0.2);
-  EXPECT_EQ(defaults.calm_velocity, 0.01);
-}
-
-TEST(GrowingStiffnessCoefficients, ItsDefaults) {
-  const GrowingStiffness<double>::Coefficients defaults{};
-  EXPECT_FALSE(defaults.grows);
-}
-
 }  // namespace kmax::control::growing_stiffness_test

@@ -537,33 +537,4 @@ TEST(HapticLoop, TheSoftStartsShareComesUpWhileEnabled) {
   EXPECT_EQ(loop.loop().ramp(), 0.0);
 }
 
-TEST(HapticLoopConfig, ItsDefaults) {
-  const HapticLoopConfig<double> defaults;
-  EXPECT_EQ(defaults.count_length, 1e-6);
-  EXPECT_EQ(defaults.wall_position, 0.0);
-  EXPECT_EQ(defaults.wall_side, 1);
-  EXPECT_EQ(defaults.position_resolution, 0.0);
-  EXPECT_EQ(defaults.position_rounding, Rounding::nearest);
-  EXPECT_EQ(defaults.velocity_limit, 0.0);
-  EXPECT_EQ(defaults.instability_action, InstabilityAction::off);
-  EXPECT_EQ(defaults.tick_rate, 20000.0);
-  EXPECT_EQ(defaults.divider, 1u);
-}
-
-TEST(HapticLoopOutput, ItsDefaults) {
-  const HapticLoop<double>::Output defaults{};
-  EXPECT_FALSE(defaults.inside);
-  EXPECT_FALSE(defaults.limited);
-  EXPECT_FALSE(defaults.slew_limited);
-  EXPECT_FALSE(defaults.ramping);
-  EXPECT_FALSE(defaults.unstable);
-  EXPECT_FALSE(defaults.new_sample);
-}
-
-TEST(HapticLoopCoefficients, ItsDefaults) {
-  const HapticLoop<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.wall_count, 0);
-  EXPECT_EQ(defaults.divider, 1u);
-}
-
 }  // namespace kmax::control::haptic_loop_test

@@ -326,13 +326,4 @@ TEST(InstabilityDetector, TakesAnyConfiguration) {
   }
 }
 
-TEST(InstabilityDetectorConfig, ItsDefaults) {
-  const InstabilityDetectorConfig<double> defaults;
-  EXPECT_EQ(defaults.force_threshold, 0.3);
-  EXPECT_EQ(defaults.displacement_threshold, 8e-5);
-  EXPECT_EQ(defaults.lowest_frequency, 15.0);
-  EXPECT_EQ(defaults.settling_time, 0.055);
-  EXPECT_EQ(defaults.rate, 20000.0);
-}
-
 }  // namespace kmax::control::instability_detector_test

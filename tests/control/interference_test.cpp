@@ -80,9 +80,4 @@ TEST(Interference, NoneDoesNothing) {
   EXPECT_EQ(interference.background(c), 0.0f);
 }
 
-TEST(InterferenceConfig, ItsDefaults) {
-  const InterferenceConfig<double> defaults;
-  EXPECT_EQ(defaults.mode, InterferenceMode::none);
-}
-
 }  // namespace kmax::control::interference_test

@@ -56,9 +56,4 @@ TEST(LowPassVelocity, SineHasTheAmplitudeAndLagOfAFirstOrderFilter) {
       0.025 * peak);  // half a sample of the difference and one of the discretization, at 0.031 rad each
 }
 
-TEST(LowPassVelocityCoefficients, ItsDefaults) {
-  const LowPassVelocity<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.gain, 0.0);
-}
-
 }  // namespace kmax::control::low_pass_velocity_test

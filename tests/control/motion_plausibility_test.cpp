@@ -313,13 +313,4 @@ TEST(MotionPlausibility, ResetForgets) {
   for (int n = 0; n < 100; ++n) EXPECT_FALSE(handle.step(0.0, 0.0, 0.0));
 }
 
-TEST(MotionPlausibilityConfig, ItsDefaults) {
-  const MotionPlausibilityConfig<double> defaults;
-  EXPECT_EQ(defaults.mass, 0.05);
-  EXPECT_EQ(defaults.hand_force, 5.0);
-  EXPECT_EQ(defaults.tolerance, 0.02);
-  EXPECT_EQ(defaults.smoothing, 0.002);
-  EXPECT_EQ(defaults.memory, 0.3);
-}
-
 }  // namespace kmax::control::motion_plausibility_test

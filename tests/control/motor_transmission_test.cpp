@@ -78,16 +78,4 @@ TEST(MotorTransmission, ALimitOfZeroMeansNoCurrent) {
   EXPECT_TRUE(out.limited);
 }
 
-TEST(MotorTransmissionOutput, ItsDefaults) {
-  const MotorTransmission<double>::Output defaults{};
-  EXPECT_FALSE(defaults.limited);
-  EXPECT_FALSE(defaults.not_finite);
-}
-
-TEST(MotorTransmissionConfig, ItsDefaults) {
-  const MotorTransmissionConfig<double> defaults;
-  EXPECT_EQ(defaults.torque_constant, 0.05);
-  EXPECT_EQ(defaults.current_limit, 5.0);
-}
-
 }  // namespace kmax::control::motor_transmission_test

@@ -222,17 +222,4 @@ TEST(PhaseWatch, ResetGivesTheWholePatienceAgain) {
   }
 }
 
-TEST(PhaseWatchConfig, ItsDefaults) {
-  const PhaseWatchConfig<double> defaults;
-  EXPECT_EQ(defaults.current_limit, 5.0);
-  EXPECT_EQ(defaults.over_current_factor, 1.5);
-  EXPECT_EQ(defaults.bandwidth, 3000.0);
-  EXPECT_EQ(defaults.rate, 20000.0);
-}
-
-TEST(PhaseWatchCoefficients, ItsDefaults) {
-  const PhaseWatch<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.patience, 20u);
-}
-
 }  // namespace kmax::control::phase_watch_test

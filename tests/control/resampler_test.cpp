@@ -195,23 +195,4 @@ TEST(ResamplerStep, NonsenseAndExcessAreBounded) {
   EXPECT_EQ(resampler_step(1e9, 1e-9), resampler_step_max);
 }
 
-TEST(ResamplerConfig, ItsDefaults) {
-  const ResamplerConfig defaults;
-  EXPECT_EQ(defaults.step, 1);
-  EXPECT_EQ(defaults.rounding, Rounding::nearest);
-}
-
-TEST(ResamplerCoefficients, ItsDefaults) {
-  const Resampler::Coefficients defaults{};
-  EXPECT_EQ(defaults.anchor, 0);
-  EXPECT_EQ(defaults.step, 1);
-  EXPECT_EQ(defaults.largest_rounded_down, 0);
-}
-
-TEST(ResamplerSample, ItsDefaults) {
-  const Resampler::Sample defaults{};
-  EXPECT_EQ(defaults.count, 0);
-  EXPECT_EQ(defaults.steps, 0);
-}
-
 }  // namespace kmax::control::resampler_test

@@ -163,22 +163,4 @@ TEST(LoopEquation, KnowsWhatCannotBeComputed) {
   EXPECT_FALSE(LoopEquation<double>({0.05, 0.1, 0.0, 1e-3, 0.0, {1.0, infinite, 0, 0, 0}}).finite());
 }
 
-TEST(SampledLoop, ItsDefaults) {
-  const SampledLoop<double> defaults;
-  EXPECT_EQ(defaults.mass, 0.0);
-  EXPECT_EQ(defaults.damping, 0.0);
-  EXPECT_EQ(defaults.wall_damping, 0.0);
-  EXPECT_EQ(defaults.period, 0.0);
-  EXPECT_EQ(defaults.delay, 0.0);
-}
-
-TEST(Hand, ItsDefaults) {
-  const Hand<double> defaults;
-  EXPECT_EQ(defaults.hand_mass, 0.0);
-  EXPECT_EQ(defaults.grip_stiffness, 0.0);
-  EXPECT_EQ(defaults.grip_damping, 0.0);
-  EXPECT_EQ(defaults.arm_stiffness, 0.0);
-  EXPECT_EQ(defaults.arm_damping, 0.0);
-}
-
 }  // namespace kmax::control::sampled_loop_test

@@ -291,24 +291,6 @@ RC_GTEST_PROP(StabilityCriteria, UnitsDoNotMatter, ()) {
 static_assert(judge(Criterion::colgate, desktop_case<float>()).applies);
 static_assert(!judge(Criterion::colgate, desktop_case<float>()).pass);
 
-TEST(StabilityCase, ItsDefaults) {
-  const StabilityCase<double> defaults;
-  EXPECT_EQ(defaults.stiffness, 0.0);
-  EXPECT_EQ(defaults.wall_damping, 0.0);
-  EXPECT_EQ(defaults.magnetic_coefficient, 0.0);
-  EXPECT_EQ(defaults.magnetic_length, 0.0);
-  EXPECT_EQ(defaults.period, 0.0);
-  EXPECT_EQ(defaults.delay, 0.0);
-  EXPECT_EQ(defaults.quantum, 0.0);
-  EXPECT_EQ(defaults.mass, 0.0);
-  EXPECT_EQ(defaults.damping, 0.0);
-  EXPECT_EQ(defaults.friction, 0.0);
-  EXPECT_EQ(defaults.operator_force, 0.0);
-  EXPECT_EQ(defaults.operator_speed, 0.0);
-  EXPECT_EQ(defaults.detection_share, 1.0);
-  EXPECT_EQ(defaults.force_limit, 0.0);
-}
-
 TEST(CriterionResult, ItsDefaults) {
   const CriterionResult<double> defaults;
   EXPECT_EQ(defaults.criterion, Criterion::colgate);

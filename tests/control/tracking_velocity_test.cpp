@@ -92,12 +92,4 @@ TEST(TrackingVelocity, OneThatWasNeverResetStandsAtTheOrigin) {
   EXPECT_EQ(velocity.update(TrackingVelocity<double>::prepare(50.0, 0.002, 1e-6), 0), 0.0);
 }
 
-TEST(TrackingVelocityCoefficients, ItsDefaults) {
-  const TrackingVelocity<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.kept, 0.0);
-  EXPECT_EQ(defaults.beta, 0.0);
-  EXPECT_EQ(defaults.scale, 0.0);
-  EXPECT_EQ(defaults.per_sample, 0.0);
-}
-
 }  // namespace kmax::control::tracking_velocity_test

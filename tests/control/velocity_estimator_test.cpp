@@ -254,17 +254,4 @@ TEST(VelocityEstimator, NumbersOfTheKindsStay) {
     EXPECT_EQ(static_cast<int>(one), number++);
 }
 
-TEST(VelocityEstimatorConfig, ItsDefaults) {
-  const VelocityEstimatorConfig<double> defaults;
-  EXPECT_EQ(defaults.kind, VelocityEstimatorKind::foaw);
-  EXPECT_EQ(defaults.window, 16);
-  EXPECT_EQ(defaults.bandwidth, 100.0);
-}
-
-TEST(VelocityEstimatorCoefficients, ItsDefaults) {
-  const VelocityEstimator<double>::Coefficients defaults{};
-  EXPECT_EQ(defaults.kind, VelocityEstimatorKind::foaw);
-  EXPECT_EQ(defaults.key, 0u);
-}
-
 }  // namespace kmax::control::velocity_estimator_test

@@ -165,11 +165,6 @@ TEST(WallLaw, NotANumberIsNotHidden) {
   EXPECT_TRUE(std::isnan(force_at(damped, -1e-3f, nan)));
 }
 
-TEST(WallLawOutput, ItsDefaults) {
-  const WallLaw<double>::Output defaults{};
-  EXPECT_FALSE(defaults.inside);
-}
-
 TEST(WallLaw, AResetForgetsTheContact) {
   WallLawConfig<double> config;
   config.kind = WallKind::adaptive;
@@ -180,15 +175,6 @@ TEST(WallLaw, AResetForgetsTheContact) {
   EXPECT_NEAR(law.update(c, -1e-6, -0.1).magnetic_coefficient, 1.8, 1e-12);
   law.reset();
   EXPECT_NEAR(law.update(c, -1e-6, -0.1).magnetic_coefficient, 0.9, 1e-12);
-}
-
-TEST(WallLawConfig, ItsDefaults) {
-  const WallLawConfig<double> defaults;
-  EXPECT_EQ(defaults.kind, WallKind::plain);
-  EXPECT_EQ(defaults.stiffness, 1000.0);
-  EXPECT_EQ(defaults.damping, 0.0);
-  EXPECT_EQ(defaults.magnetic_coefficient, 2.0);
-  EXPECT_EQ(defaults.magnetic_length, 0.001);
 }
 
 }  // namespace kmax::control::wall_law_test

@@ -57,10 +57,4 @@ TEST(WallSoftening, TakesAnyConfiguration) {
   }
 }
 
-TEST(WallSofteningConfig, ItsDefaults) {
-  const WallSofteningConfig<double> defaults;
-  EXPECT_EQ(defaults.halving_time, 0.1);
-  EXPECT_EQ(defaults.least, 0.05);
-}
-
 }  // namespace kmax::control::wall_softening_test

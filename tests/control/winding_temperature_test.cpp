@@ -251,16 +251,4 @@ TEST(WindingTemperature, DeratingSettlesBelowTheLimit) {
               current_for(config, static_cast<double>(model.winding()) - 25.0), 0.01);
 }
 
-TEST(WindingTemperatureConfig, ItsDefaults) {
-  const WindingTemperatureConfig<double> defaults;
-  EXPECT_EQ(defaults.resistance, 1.0);
-  EXPECT_EQ(defaults.reference_temperature, 25.0);
-  EXPECT_EQ(defaults.loss_factor, 1.0);
-  EXPECT_EQ(defaults.winding_capacity, 15.0);
-  EXPECT_EQ(defaults.winding_to_case, 3.0);
-  EXPECT_EQ(defaults.case_capacity, 150.0);
-  EXPECT_EQ(defaults.case_to_ambient, 8.0);
-  EXPECT_EQ(defaults.ambient_temperature, 25.0);
-}
-
 }  // namespace kmax::control::winding_temperature_test

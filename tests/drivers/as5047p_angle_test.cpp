@@ -410,30 +410,4 @@ RC_GTEST_PROP(As5047pAngle, RandomNoiseNeverLosesATurn, ()) {
   if (sample.valid && !sample.held) RC_ASSERT(sample.count == static_cast<std::uint32_t>(position));
 }
 
-TEST(As5047pAngleConfig, ItsDefaults) {
-  const As5047pAngleConfig defaults;
-  EXPECT_EQ(defaults.maximum_step, 512u);
-  EXPECT_EQ(defaults.maximum_step_change, 64u);
-  EXPECT_EQ(defaults.maximum_held, 4u);
-  EXPECT_EQ(defaults.zeros_until_probe, 32u);
-  EXPECT_EQ(defaults.maximum_unseen, 100u);
-}
-
-TEST(As5047pSample, ItsDefaults) {
-  const As5047pSample defaults;
-  EXPECT_EQ(defaults.count, 0u);
-  EXPECT_FALSE(defaults.valid);
-  EXPECT_TRUE(defaults.held);
-  EXPECT_EQ(defaults.reference_generation, 0u);
-}
-
-TEST(As5047pDiagnostics, ItsDefaults) {
-  const As5047pDiagnostics defaults{};
-  EXPECT_EQ(defaults.gain, 0);
-  EXPECT_FALSE(defaults.ready);
-  EXPECT_FALSE(defaults.overflow);
-  EXPECT_FALSE(defaults.field_too_strong);
-  EXPECT_FALSE(defaults.field_too_weak);
-}
-
 }  // namespace kmax::drivers::as5047p_angle_test

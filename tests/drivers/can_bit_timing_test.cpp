@@ -139,26 +139,4 @@ TEST(CanBitTiming, ValidKnowsTheFields) {
   EXPECT_FALSE((CanBitTiming{1, 5, 1, 2}.valid())) << "jump wider than the segment that is shortened";
 }
 
-TEST(CanBitTimingGoal, ItsDefaults) {
-  const CanBitTimingGoal defaults;
-  EXPECT_EQ(defaults.sample_point_permille, 875u);
-  EXPECT_EQ(defaults.sample_point_tolerance_permille, 25u);
-  EXPECT_EQ(defaults.rate_tolerance_ppm, 1000u);
-}
-
-TEST(CanBitTiming, ItsDefaults) {
-  const CanBitTiming defaults;
-  EXPECT_EQ(defaults.prescaler, 0u);
-  EXPECT_EQ(defaults.segment_1, 0u);
-  EXPECT_EQ(defaults.segment_2, 0u);
-  EXPECT_EQ(defaults.jump_width, 0u);
-}
-
-TEST(CanBitTimingSolution, ItsDefaults) {
-  const CanBitTimingSolution defaults{};
-  EXPECT_EQ(defaults.rate_error_ppm, 0u);
-  EXPECT_EQ(defaults.sample_error_permille, 0u);
-  EXPECT_FALSE(defaults.usable);
-}
-
 }  // namespace kmax::drivers::stm32f4::can_bit_timing_test

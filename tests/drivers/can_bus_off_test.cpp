@@ -86,16 +86,4 @@ TEST(CanBusOff, StoppedDoesNothing) {
   EXPECT_EQ(node.machine.state(), State::off);
 }
 
-TEST(CanBusOffConfig, ItsDefaults) {
-  const CanBusOffConfig defaults;
-  EXPECT_EQ(defaults.shortest_wait_us, 100'000u);
-  EXPECT_EQ(defaults.longest_wait_us, 2'000'000u);
-  EXPECT_EQ(defaults.stable_us, 1'000'000u);
-}
-
-TEST(CanBusOffCounters, ItsDefaults) {
-  const CanBusOffCounters defaults{};
-  EXPECT_EQ(defaults.bus_offs, 0u);
-}
-
 }  // namespace kmax::drivers::stm32f4::can_bus_off_test

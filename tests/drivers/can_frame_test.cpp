@@ -52,12 +52,4 @@ TEST(CanFrame, ArbitrationOfTheSameUpperBits) {
   EXPECT_LT(can_arbitration(extended), can_arbitration(CanFrame{.identifier = 0x124}));
 }
 
-TEST(CanFrame, ItsDefaults) {
-  const CanFrame defaults;
-  EXPECT_EQ(defaults.identifier, 0u);
-  EXPECT_FALSE(defaults.extended);
-  EXPECT_FALSE(defaults.remote);
-  EXPECT_EQ(defaults.length, 0u);
-}
-
 }  // namespace kmax::drivers::can_frame_test

@@ -331,21 +331,6 @@ TEST(Can, ErrorsByName) {
   EXPECT_EQ(bench.can.msr.value, 4U) << "ERRI is written 1";
 }
 
-TEST(CanConfig, ItsDefaults) {
-  const CanConfig defaults;
-  EXPECT_FALSE(defaults.self_test);
-  EXPECT_EQ(defaults.polls, 10'000u);
-}
-
-TEST(CanErrors, ItsDefaults) {
-  const CanErrors defaults;
-  EXPECT_EQ(defaults.transmit, 0u);
-  EXPECT_EQ(defaults.receive, 0u);
-  EXPECT_FALSE(defaults.warning);
-  EXPECT_FALSE(defaults.passive);
-  EXPECT_FALSE(defaults.bus_off);
-}
-
 TEST(CanReceiveCounters, NothingHasBeenReceivedAtFirst) {
   const CanReceiveCounters defaults{};
   EXPECT_EQ(defaults.received, 0u);

@@ -263,27 +263,4 @@ TEST(CurrentSampling, SlowCodesAndTheirAge) {
   EXPECT_EQ(sample.slow_age, 255U);
 }
 
-TEST(CurrentSample, ItsDefaults) {
-  const CurrentSample defaults;
-  EXPECT_FALSE(defaults.valid);
-  EXPECT_EQ(defaults.phase_b, 0u);
-  EXPECT_EQ(defaults.phase_c, 0u);
-  EXPECT_EQ(defaults.supply, 0u);
-  EXPECT_EQ(defaults.slow_age, 0u);
-}
-
-TEST(CurrentSamplingCounters, ItsDefaults) {
-  const CurrentSamplingCounters defaults;
-  EXPECT_EQ(defaults.axis_mismatches, 0u);
-  EXPECT_EQ(defaults.overruns, 0u);
-  EXPECT_EQ(defaults.missing_phase_c, 0u);
-  EXPECT_EQ(defaults.spurious, 0u);
-}
-
-TEST(ZeroCurrentCodes, ItsDefaults) {
-  const ZeroCurrentCodes defaults{};
-  EXPECT_EQ(defaults.phase_b, 0u);
-  EXPECT_EQ(defaults.phase_c, 0u);
-}
-
 }  // namespace kmax::drivers::stm32f4::current_sampling_test

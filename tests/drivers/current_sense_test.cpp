@@ -235,11 +235,4 @@ RC_GTEST_PROP(OffsetCalibration, IsTheMean, ()) {
   RC_ASSERT(static_cast<double>(calibration.offset()) == mean);
 }
 
-TEST(OffsetCalibrationConfig, ItsDefaults) {
-  const OffsetCalibrationConfig defaults;
-  EXPECT_EQ(defaults.log2_samples, 10u);
-  EXPECT_EQ(defaults.window, offset_window(CurrentSenseGain::x40));
-  EXPECT_EQ(defaults.largest_spread, 64u);
-}
-
 }  // namespace kmax::drivers::current_sense_test

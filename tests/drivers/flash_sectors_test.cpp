@@ -195,10 +195,4 @@ TEST(FlashSectors, CachesThatWereOffStayOff) {
   EXPECT_EQ(chip.flash.acr.value, 0x105U);
 }
 
-TEST(FlashWaits, ItsDefaults) {
-  const FlashWaits defaults;
-  EXPECT_EQ(defaults.erase, 30'000'000u);
-  EXPECT_EQ(defaults.word, 20'000u);
-}
-
 }  // namespace kmax::drivers::stm32f4::flash_sectors_test

@@ -100,14 +100,4 @@ TEST(GpioPin, LevelBeforeDirectionAndFunctionBeforeHandOver) {
   EXPECT_EQ(order, "pam") << "an output level must not be touched by a pin that is no output";
 }
 
-TEST(GpioConfig, ItsDefaults) {
-  const GpioConfig defaults;
-  EXPECT_EQ(defaults.mode, GpioMode::input);
-  EXPECT_EQ(defaults.pull, GpioPull::none);
-  EXPECT_EQ(defaults.speed, GpioSpeed::low);
-  EXPECT_EQ(defaults.output, GpioOutput::push_pull);
-  EXPECT_FALSE(defaults.initial_level);
-  EXPECT_EQ(defaults.alternate_function, 0u);
-}
-
 }  // namespace kmax::drivers::stm32f4::gpio_test

@@ -258,11 +258,4 @@ TEST(QuadratureIndexWatch, ResetBelievesAgain) {
   EXPECT_TRUE(watch.ISR_plausible(1000, false));
 }
 
-TEST(QuadratureIndexConfig, ItsDefaults) {
-  const QuadratureIndexConfig defaults;
-  EXPECT_EQ(defaults.counts_per_turn, 8192u);
-  EXPECT_EQ(defaults.tolerance, 4);
-  EXPECT_EQ(defaults.widest, 16);
-}
-
 }  // namespace kmax::drivers::quadrature_index_watch_test

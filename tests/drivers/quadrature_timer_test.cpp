@@ -68,10 +68,4 @@ TEST(QuadratureTimer, RefusesWithoutTouchingAnything) {
   EXPECT_TRUE(timer.smcr.writes.empty());
 }
 
-TEST(QuadratureTimerConfig, ItsDefaults) {
-  const QuadratureTimerConfig defaults;
-  EXPECT_EQ(defaults.input_filter, 11u);
-  EXPECT_FALSE(defaults.reversed);
-}
-
 }  // namespace kmax::drivers::stm32f4::quadrature_timer_test

@@ -183,19 +183,4 @@ TEST(ReferencedQuadratureCounter, AnotherConfigurationBeforeAReferenceLeavesTheC
   EXPECT_EQ(encoder.reading.reference_generation, 0u);
 }
 
-TEST(ReferencedQuadratureConfig, ItsDefaults) {
-  const ReferencedQuadratureConfig defaults;
-  EXPECT_FALSE(defaults.has_index);
-  EXPECT_FALSE(defaults.from_index);
-  EXPECT_EQ(defaults.counts_per_turn, 8192u);
-}
-
-TEST(ReferencedQuadratureCounterReading, ItsDefaults) {
-  const ReferencedQuadratureCounter<>::Reading defaults{};
-  EXPECT_EQ(defaults.count, 0u);
-  EXPECT_FALSE(defaults.valid);
-  EXPECT_FALSE(defaults.referenced);
-  EXPECT_EQ(defaults.reference_generation, 0u);
-}
-
 }  // namespace kmax::drivers::referenced_quadrature_counter_test

@@ -94,10 +94,4 @@ TEST(SpiMaster, OneHolderAtATime) {
   EXPECT_TRUE(bus.master.claim());
 }
 
-TEST(SpiMasterConfig, ItsDefaults) {
-  const SpiMasterConfig defaults;
-  EXPECT_EQ(defaults.prescaler_code, 3u);
-  EXPECT_EQ(defaults.polls, 1000u);
-}
-
 }  // namespace kmax::drivers::stm32f4::spi_master_test

@@ -165,18 +165,4 @@ TEST(Usart, ConfiguringDropsWhatIsBeingSentAndWhatHasComeIn) {
   EXPECT_TRUE(registers.dr.writes.empty());
 }
 
-TEST(UsartConfig, ItsDefaults) {
-  const UsartConfig defaults;
-  EXPECT_EQ(defaults.baud_rate, 115'200u);
-  EXPECT_EQ(defaults.parity, UsartParity::even);
-}
-
-TEST(UsartEvent, ItsDefaults) {
-  const UsartEvent defaults{};
-  EXPECT_FALSE(defaults.received);
-  EXPECT_EQ(defaults.byte, 0);
-  EXPECT_FALSE(defaults.line_error);
-  EXPECT_FALSE(defaults.transmission_complete);
-}
-
 }  // namespace kmax::drivers::stm32f4::usart_test

@@ -26,12 +26,5 @@ TEST(CanReadings, ABoardThatSaysNothingHasNoController) {
   EXPECT_EQ(readings.discarded, 0u);
 }
 
-TEST(CanSettings, ItsDefaults) {
-  const CanSettings settings;
-  EXPECT_EQ(settings.bit_rate, 1'000'000u);
-  EXPECT_EQ(settings.identifier_count, 0);
-  EXPECT_EQ(settings.identifiers, (std::array<std::uint16_t, 24>{}));
-}
-
 }  // namespace
 }  // namespace kmax::firmware::can_port_test

@@ -26,18 +26,5 @@ TEST(CrashRecord, BeginsWithoutACrash) {
   EXPECT_EQ(record.status + record.hard_fault_status + record.address, 0U);
 }
 
-TEST(CrashRecord, ItsDefaults) {
-  const CrashRecord defaults;
-  EXPECT_EQ(defaults.count, 0u);
-  EXPECT_EQ(defaults.cause, CrashCause::none);
-  EXPECT_EQ(defaults.exception_number, 0u);
-  EXPECT_EQ(defaults.program_counter, 0u);
-  EXPECT_EQ(defaults.link_register, 0u);
-  EXPECT_EQ(defaults.status, 0u);
-  EXPECT_EQ(defaults.hard_fault_status, 0u);
-  EXPECT_EQ(defaults.address, 0u);
-  EXPECT_FALSE(defaults.is_new);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::crash_record_test

@@ -407,11 +407,5 @@ RC_GTEST_PROP(Emergency, InTheEndTheBusKnowsTheState, ()) {
   RC_ASSERT(last == (model.empty() ? recovered : message(numbered(model.back()), 0x81)));
 }
 
-TEST(EmergencyError, ItsDefaults) {
-  const EmergencyError defaults;
-  EXPECT_EQ(defaults.code, 0u);
-  EXPECT_EQ(defaults.register_bits, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::emergency_test

@@ -199,11 +199,5 @@ TEST(HeartbeatConsumer, StartingAgainWaitsForTheAliveAndKeepsTheLost) {
   EXPECT_EQ(consumer.poll(60'000), 6);
 }
 
-TEST(HeartbeatConsumerCounters, ItsDefaults) {
-  const HeartbeatConsumerCounters defaults{};
-  EXPECT_EQ(defaults.heartbeats, 0u);
-  EXPECT_EQ(defaults.lost, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::heartbeat_consumer_test

@@ -512,13 +512,5 @@ RC_GTEST_PROP(LssSlave, FastscanFindsEveryDeviceOnTheBus, ()) {
   RC_ASSERT(!fastscan(bus).has_value());
 }
 
-TEST(LssIdentity, ItsDefaults) {
-  const LssIdentity defaults;
-  EXPECT_EQ(defaults.vendor, 0u);
-  EXPECT_EQ(defaults.product, 0u);
-  EXPECT_EQ(defaults.revision, 0u);
-  EXPECT_EQ(defaults.serial, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::lss_slave_test

@@ -90,14 +90,5 @@ TEST(PdoSettings, WhatDoesNotExistMayHoldAnything) {
   EXPECT_FALSE(read.settings.exists);
 }
 
-TEST(PdoSettings, ItsDefaults) {
-  const PdoSettings defaults;
-  EXPECT_FALSE(defaults.exists);
-  EXPECT_EQ(defaults.identifier, 0u);
-  EXPECT_EQ(defaults.transmission_type, 255u);
-  EXPECT_EQ(defaults.inhibit_us, 0u);
-  EXPECT_EQ(defaults.event_us, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::pdo_settings_test

@@ -236,11 +236,5 @@ RC_GTEST_PROP(Rpdo, UnpacksWhatWasPacked, ()) {
   RC_ASSERT(node.take() == expected);
 }
 
-TEST(RpdoCounters, ItsDefaults) {
-  const RpdoCounters defaults{};
-  EXPECT_EQ(defaults.too_short, 0u);
-  EXPECT_EQ(defaults.refused, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::rpdo_test

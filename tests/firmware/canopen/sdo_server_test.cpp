@@ -300,21 +300,6 @@ TEST_F(SdoServerTest, AnotherNodeIdTakesEffectWithTheStart) {
   EXPECT_EQ(frame, (drivers::CanFrame{.identifier = 0x5FF, .length = 8, .data = device_type_answer}));
 }
 
-TEST(SdoConfig, ItsDefaults) {
-  const SdoConfig defaults;
-  EXPECT_EQ(defaults.timeout_us, 1'000'000u);
-  EXPECT_EQ(defaults.resume_after_us, 250'000u);
-  EXPECT_EQ(defaults.download_block_size, 31u);
-}
-
-TEST(SdoCounters, ItsDefaults) {
-  const SdoCounters defaults;
-  EXPECT_EQ(defaults.aborts_sent, 0u);
-  EXPECT_EQ(defaults.timeouts, 0u);
-  EXPECT_EQ(defaults.segments_lost, 0u);
-  EXPECT_EQ(defaults.segments_repeated, 0u);
-}
-
 TEST(SdoChannel, IsNoneByDefault) {
   const SdoChannel defaults{};
   EXPECT_EQ(defaults.request, 0);

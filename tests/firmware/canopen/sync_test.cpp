@@ -185,11 +185,5 @@ RC_GTEST_PROP(Sync, OverAnyPollsThereAreAsManyAsPeriodsAndEachIsOnTheGrid, ()) {
   RC_ASSERT(made == (bench.now_us - start) / period);
 }
 
-TEST(SyncSettings, ItsDefaults) {
-  const Sync::Settings defaults{};
-  EXPECT_EQ(defaults.period_us, 0u);
-  EXPECT_EQ(defaults.counter_overflow, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::canopen::sync_test

@@ -392,31 +392,5 @@ RC_GTEST_PROP(CaptureProperty, TheSamplesAreThoseOfTheTicksTheyAreSaidToBe, ()) 
   }
 }
 
-TEST(CaptureConfig, ItsDefaults) {
-  const CaptureConfig defaults;
-  EXPECT_EQ(defaults.axis, 0);
-  EXPECT_EQ(defaults.interval, 1u);
-  EXPECT_EQ(defaults.samples, 0u);
-  EXPECT_EQ(defaults.pre_trigger, 0u);
-  EXPECT_EQ(defaults.trigger, CaptureTrigger::now);
-  EXPECT_EQ(defaults.level, 0.0f);
-}
-
-TEST(CaptureReadings, ItsDefaults) {
-  const CaptureReadings defaults;
-  EXPECT_EQ(defaults.state, CaptureState::idle);
-  EXPECT_EQ(defaults.taken, 0u);
-  EXPECT_EQ(defaults.trigger_sample, 0u);
-  EXPECT_EQ(defaults.first_tick, 0u);
-  EXPECT_EQ(defaults.channels, 0u);
-}
-
-TEST(CaptureEvent, ItsDefaults) {
-  const CaptureEvent defaults{};
-  EXPECT_EQ(defaults.flags, 0u);
-  EXPECT_EQ(defaults.force, 0.0f);
-  EXPECT_EQ(defaults.velocity, 0.0f);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::capture_test

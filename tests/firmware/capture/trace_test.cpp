@@ -52,13 +52,5 @@ TEST(Trace, KeepsTheLast512RecordsWithTheirExactBits) {
   EXPECT_NE(record_at(trace, 1487).tick, made(1487).tick);
 }
 
-TEST(TraceRecord, ItsDefaults) {
-  const TraceRecord defaults{};
-  EXPECT_EQ(defaults.tick, 0u);
-  EXPECT_EQ(defaults.count, 0);
-  EXPECT_EQ(defaults.force, 0.0f);
-  EXPECT_EQ(defaults.magnetic_coefficient, 0.0f);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::trace_test

@@ -330,17 +330,5 @@ TEST(FaultLog, WithTooLittleMemoryKeepsNothing) {
   EXPECT_TRUE(std::ranges::all_of(memory, [](const Word& word) { return word.value == 0; }));
 }
 
-TEST(LogEntry, ItsDefaults) {
-  const LogEntry defaults;
-  EXPECT_EQ(defaults.number, 0u);
-  EXPECT_EQ(defaults.start, 0u);
-  EXPECT_EQ(defaults.count, 1u);
-  EXPECT_EQ(defaults.uptime_s, 0u);
-  EXPECT_EQ(defaults.tick, 0u);
-  EXPECT_EQ(defaults.event, LogEvent::none);
-  EXPECT_EQ(defaults.axis, 0u);
-  EXPECT_EQ(defaults.code, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::fault_log_test

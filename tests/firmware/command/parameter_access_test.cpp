@@ -366,11 +366,5 @@ RC_GTEST_PROP(ParameterAccess, WhateverIsWrittenRulesHoldRangesHoldAndARefusedWr
   }
 }
 
-TEST(ParameterAccessResult, ItsDefaults) {
-  const ParameterAccess::Result defaults{};
-  EXPECT_EQ(defaults.refusal, Refusal::none);
-  EXPECT_EQ(defaults.address, 0);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::parameter_access_test

@@ -93,18 +93,4 @@ TEST(AxesSettings, TheScaleIsAWholeNumberOfResamplersSteps) {
   EXPECT_NE(settings.scale(0).resolution, settings.scale(1).resolution);
 }
 
-TEST(AxesSettingsCircumstances, ItsDefaults) {
-  const AxesSettings::Circumstances defaults{};
-  EXPECT_EQ(defaults.current_share, 1.0f);
-  EXPECT_EQ(defaults.winding_temperature, 25.0f);
-  EXPECT_TRUE(defaults.commutated);
-  EXPECT_EQ(defaults.modulation_limit, 0.0f);
-}
-
-TEST(AxesSettingsScale, ItsDefaults) {
-  const AxesSettings::Scale defaults{};
-  EXPECT_EQ(defaults.count_length, 0.0);
-  EXPECT_EQ(defaults.resolution, 0.0f);
-}
-
 }  // namespace kmax::firmware::axes_settings_test

@@ -272,10 +272,5 @@ TEST(Statusword, MasksOfTheStandardTellEveryStateWhateverTheOtherBits) {
   }
 }
 
-TEST(DriveOptions, ItsDefaults) {
-  const DriveOptions defaults{};
-  EXPECT_TRUE(defaults.stay_in_quick_stop);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::axis_state_machine_test

@@ -292,25 +292,6 @@ TEST_F(AxisTest, OneThatIsNotThereHasNoCountAndNothingIsNew) {
   EXPECT_EQ(report.condition, Fault::none);
 }
 
-TEST(AxisReport, ItsDefaults) {
-  const AxisReport defaults;
-  EXPECT_EQ(defaults.counted, 0);
-  EXPECT_EQ(defaults.tick, 0u);
-  EXPECT_EQ(defaults.generation, 0u);
-  EXPECT_EQ(defaults.reference_generation, 0u);
-  EXPECT_EQ(defaults.armed_samples, 0u);
-  EXPECT_EQ(defaults.limited_samples, 0u);
-  EXPECT_EQ(defaults.alarms, 0u);
-  EXPECT_EQ(defaults.softening, 1.0f);
-  EXPECT_EQ(defaults.force, 0.0f);
-  EXPECT_EQ(defaults.fault, Fault::none);
-  EXPECT_EQ(defaults.condition, Fault::none);
-  EXPECT_EQ(defaults.fault_value, 0.0f);
-  EXPECT_FALSE(defaults.enabled);
-  EXPECT_FALSE(defaults.count_valid);
-  EXPECT_FALSE(defaults.referenced);
-}
-
 TEST(AxisSetting, ItsDefaults) {
   const AxisSetting defaults;
   EXPECT_TRUE(defaults.supply.contains(0.0f));
@@ -342,22 +323,6 @@ TEST(SupplyWindow, HasWhatIsBetweenItsEndsAndNothingIfTheyAreTheWrongWayRound) {
       EXPECT_FALSE(none.is_below(voltage)) << voltage;
     }
   }
-}
-
-TEST(AxisCommand, ItsDefaults) {
-  const Axis::Command defaults{};
-  EXPECT_FALSE(defaults.enable);
-  EXPECT_EQ(defaults.from_axes, 0.0f);
-  EXPECT_EQ(defaults.from_host, 0.0f);
-  EXPECT_EQ(defaults.share, 1.0f);
-}
-
-TEST(AxisInput, ItsDefaults) {
-  const Axis::Input defaults{};
-  EXPECT_EQ(defaults.condition, Fault::none);
-  EXPECT_FALSE(defaults.motor.present);
-  EXPECT_EQ(defaults.reference_generation, 0u);
-  EXPECT_FALSE(defaults.referenced);
 }
 
 }  // namespace

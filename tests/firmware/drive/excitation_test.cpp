@@ -436,17 +436,5 @@ TEST_F(ExcitationTest, AnotherRunStartsAnewInMidRamp) {
   EXPECT_NEAR(out.along, 3.0f / 200.0f, 1e-6f) << "the square wave begins with its positive half again";
 }
 
-TEST(ExcitationOutput, ItsDefaults) {
-  const Excitation::Output defaults{};
-  EXPECT_EQ(defaults.along, 0.0f);
-  EXPECT_EQ(defaults.across, 0.0f);
-  EXPECT_EQ(defaults.force, 0.0f);
-  EXPECT_EQ(defaults.angle, 0u);
-  EXPECT_EQ(defaults.electrical_speed, 0.0f);
-  EXPECT_FALSE(defaults.alternating);
-  EXPECT_FALSE(defaults.started);
-  EXPECT_FALSE(defaults.finished);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::excitation_test

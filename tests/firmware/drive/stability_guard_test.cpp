@@ -288,14 +288,5 @@ TEST(GuardFinding, NumbersOfModesAndVerdictsAreTheProtocols) {
   EXPECT_EQ(static_cast<int>(Verdict::fail), 2);
 }
 
-TEST(GuardFinding, ItsDefaults) {
-  const GuardFinding defaults;
-  EXPECT_EQ(defaults.verdict, Verdict::not_judged);
-  EXPECT_EQ(defaults.criterion, control::Criterion::colgate);
-  EXPECT_EQ(defaults.failed, 0u);
-  EXPECT_EQ(defaults.value, 0.0f);
-  EXPECT_EQ(defaults.bound, 0.0f);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::stability_guard_test

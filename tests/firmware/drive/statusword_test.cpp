@@ -85,18 +85,5 @@ TEST(Statusword, OfADriveThatDoesNothingIsTheStatesPattern) {
   EXPECT_EQ(statusword_of({.state = operation_enabled, .mode = DriveMode::torque, .halted = true}), 0x0227);
 }
 
-TEST(DriveStatus, ItsDefaults) {
-  const DriveStatus defaults;
-  EXPECT_EQ(defaults.state, DriveState::not_ready_to_switch_on);
-  EXPECT_EQ(defaults.mode, DriveMode::haptic);
-  EXPECT_FALSE(defaults.supplied);
-  EXPECT_FALSE(defaults.power_stage_on);
-  EXPECT_FALSE(defaults.warning);
-  EXPECT_FALSE(defaults.limited);
-  EXPECT_FALSE(defaults.halted);
-  EXPECT_FALSE(defaults.force_is_zero);
-  EXPECT_FALSE(defaults.excitation_finished);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::statusword_test

@@ -226,12 +226,5 @@ TEST(ThermalSupervisor, TheResistanceFollowsInSteps) {
   EXPECT_LE(changes, 8);
 }
 
-TEST(ThermalSupervisorConfig, ItsDefaults) {
-  const ThermalSupervisorConfig defaults;
-  EXPECT_EQ(defaults.motor_limit, 120.0f);
-  EXPECT_EQ(defaults.power_stage_limit, 100.0f);
-  EXPECT_EQ(defaults.derating, 20.0f);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::thermal_supervisor_test

@@ -640,21 +640,5 @@ RC_GTEST_PROP(RtuPort, NoiseNeverGetsAReplyAndNeverStopsThePort, ()) {
   RC_ASSERT(client.is_alive());
 }
 
-TEST(RtuPortConfig, ItsDefaults) {
-  const RtuPortConfig defaults;
-  EXPECT_EQ(defaults.unit, 1u);
-  EXPECT_EQ(defaults.baud_rate, 115200u);
-  EXPECT_TRUE(defaults.half_duplex);
-}
-
-TEST(RtuPortCounters, ItsDefaults) {
-  const RtuPortCounters defaults;
-  EXPECT_EQ(defaults.other_units, 0u);
-  EXPECT_EQ(defaults.requests, 0u);
-  EXPECT_EQ(defaults.broadcasts, 0u);
-  EXPECT_EQ(defaults.replies, 0u);
-  EXPECT_EQ(defaults.exceptions, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::modbus::rtu_port_test

@@ -340,16 +340,5 @@ RC_GTEST_PROP(RtuReceiver, FramesFollowTheDefinitionHoweverOftenItIsPolled, ()) 
   RC_ASSERT(listener.receiver.is_idle());
 }
 
-TEST(RtuReceiverCounters, ItsDefaults) {
-  const RtuReceiverCounters defaults;
-  EXPECT_EQ(defaults.frames_received, 0u);
-  EXPECT_EQ(defaults.crc_errors, 0u);
-  EXPECT_EQ(defaults.line_errors, 0u);
-  EXPECT_EQ(defaults.gap_errors, 0u);
-  EXPECT_EQ(defaults.oversize, 0u);
-  EXPECT_EQ(defaults.undersize, 0u);
-  EXPECT_EQ(defaults.abandoned, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::modbus::rtu_receiver_test

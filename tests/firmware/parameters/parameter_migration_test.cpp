@@ -235,11 +235,5 @@ TEST(PersistentParameters, IdentitiesAreUniqueAndThoseOfTheBus) {
   EXPECT_EQ(parts.type, Type::float32);
 }
 
-TEST(MigrationReport, ItsDefaults) {
-  const MigrationReport defaults;
-  EXPECT_EQ(defaults.dropped, 0u);
-  EXPECT_EQ(defaults.defaulted, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::parameter_migration_test

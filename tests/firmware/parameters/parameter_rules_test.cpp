@@ -82,11 +82,5 @@ TEST(ParameterRules, TheSupplysLimitIsAtMostWhatTheBoardsPartsBear) {
   EXPECT_EQ(check_rules(values).refusal, Refusal::none);
 }
 
-TEST(BrokenRule, ItsDefaults) {
-  const BrokenRule defaults{};
-  EXPECT_EQ(defaults.refusal, Refusal::none);
-  EXPECT_EQ(defaults.slot, 0u);
-}
-
 }  // namespace
 }  // namespace kmax::firmware::parameter_rules_test
