@@ -268,7 +268,7 @@ class NativeBoard {
     if (sending_until_us_ != 0) {
       if (now_us_ < sending_until_us_) return;
       outgoing_.insert(outgoing_.end(), reply_.begin(), reply_.end());
-      application_->serial().reply_sent(static_cast<std::uint32_t>(sending_until_us_));
+      application_->serial().reply_sent();
       sending_until_us_ = 0;
     }
     const auto reply = application_->serial().reply_due(now);

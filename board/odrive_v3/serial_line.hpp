@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <span>
 
@@ -35,7 +34,7 @@ class SerialLine {
   /// Main loop, after the link's poll().
   void poll(firmware::ModbusEdge& link, std::uint32_t now_us) {
     if (reply_sent_.take()) {
-      link.reply_sent(reply_sent_us_);
+      link.reply_sent();
       replying_ = false;
     }
     if (replying_) return;
@@ -55,12 +54,8 @@ class SerialLine {
   bool ISR_serve(firmware::ModbusEdge& link, const Clock& clock) {
     const drivers::stm32f4::UsartEvent event = usart_.ISR_serve();
     if (!event.received && !event.line_error && !event.transmission_complete) return false;
-    const std::uint32_t now = clock.now_us();
-    if (event.received || event.line_error) link.ISR_byte(event.byte, event.line_error, now);
-    if (event.transmission_complete) {
-      reply_sent_us_ = now;
-      reply_sent_.ISR_raise();
-    }
+    if (event.received || event.line_error) link.ISR_byte(event.byte, event.line_error, clock.now_us());
+    if (event.transmission_complete) reply_sent_.ISR_raise();
     return true;
   }
 
@@ -81,7 +76,6 @@ class SerialLine {
   std::uint32_t kernel_clock_hz_;
   drivers::stm32f4::Usart<> usart_{drivers::stm32f4::usart2()};
   firmware::SerialSettings settings_{};
-  std::atomic<std::uint32_t> reply_sent_us_{0};  ///< written before the flag
   firmware::InterruptSignal reply_sent_;
   bool replying_ = false;  ///< the main loop's: until reply_sent_, which it looks at in every turn
 };

@@ -7,7 +7,6 @@ modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
   modbus::RtuPortConfig config;
   config.unit = static_cast<std::uint8_t>(values.whole<"modbus.unit">());
   config.baud_rate = static_cast<std::uint32_t>(values.whole<"modbus.baud_rate">());
-  config.half_duplex = false;  // separate wires for both directions
   return config;
 }
 }  // namespace

@@ -43,7 +43,7 @@ class ModbusEdge {
   /// A reply that may be sent now, once; the bytes stay valid until reply_sent().
   std::span<const std::uint8_t> reply_due(std::uint32_t now_us) { return port_.reply_due(now_us); }
   /// The reply's last stop bit has left.
-  void reply_sent(std::uint32_t now_us) { port_.reply_sent(now_us); }
+  void reply_sent() { port_.reply_sent(); }
   /// What the line must be set to; changes only while no reply is under way.
   SerialSettings settings() const { return {port_.config().baud_rate}; }
 

@@ -4,18 +4,16 @@
 //   RtuPort port(bank, RtuPortConfig{.unit = 1, .baud_rate = 115200});
 //   loop:  now = clock;  for each received character: port.receive(byte, line_error, end_time);
 //          port.poll(now);
-//          if (auto reply = port.reply_due(now); !reply.empty()) enable the driver, send all of it;
-//          when the last stop bit has left: disable the driver, port.reply_sent(now);
+//          if (auto reply = port.reply_due(now); !reply.empty()) send all of it;
+//          when the last stop bit has left: port.reply_sent();
 //
 // Reply: reply_due() returns it once, at least t3.5 after the last stop bit of the request and never while
-// characters come in. The span stays valid up to reply_sent(), which must be called. Everything that is
-// received in between, and every character that began before reply_sent(), is the line's echo of the reply
-// (RS-485, two wires) and is dropped.
+// characters come in. The span stays valid up to reply_sent(), which must be called.
 //
-// On a full-duplex line (half_duplex = false) there is no echo, and nothing is dropped: the next request may
-// begin as soon as the client has the last character of the reply, which can be before the driver reports
-// that it left. A request that is complete while the reply is still being sent is not carried out, but
-// counted, and shows that the host is alive.
+// The line has a pair of wires for each direction, so that nothing comes back of what is sent: the next
+// request may begin as soon as the client has the last character of the reply, which can be before the driver
+// reports that it left. A request that is complete while the reply is still being sent is not carried out,
+// but counted, and shows that the host is alive.
 //
 // A character that arrives while a reply waits to be fetched means that the client has given up on that reply
 // (or does not keep the protocol). The reply is dropped, since sent now it would be taken for the answer to
@@ -49,7 +47,6 @@ struct RtuPortConfig {
   std::uint8_t unit = 1;             // 1..247
   std::uint32_t baud_rate = 115200;  // baud_rate_min .. baud_rate_max
   CharacterFormat format{};
-  bool half_duplex = true;  // RS-485 on two wires: what is received while sending is our own echo
 
   [[nodiscard]] constexpr bool is_valid() const {
     return unit != broadcast_unit && unit <= unit_max && baud_rate >= baud_rate_min &&
@@ -70,7 +67,6 @@ class RtuPort {
 
   // A character whose last stop bit ended at `time_us`; `line_error` for parity, framing or overrun.
   void receive(std::uint8_t byte, bool line_error, std::uint32_t time_us) {
-    if (is_echo(time_us)) return;
     drop_reply();
     if (const std::optional<RtuFrame> frame = receiver_.receive(byte, line_error, time_us)) {
       handle(*frame);
@@ -81,8 +77,6 @@ class RtuPort {
   // At least once a second.
   void poll(std::uint32_t now_us) {
     if (server_.is_idle() && receiver_.is_idle()) return;
-    if (server_.is_settling() && elapsed_us(now_us, reply_end_us_) >= receiver_.timing().character_us)
-      server_.settled();
     if (const std::optional<RtuFrame> frame = receiver_.poll(now_us)) handle(*frame);
   }
 
@@ -94,11 +88,9 @@ class RtuPort {
     return server_.take_reply();
   }
 
-  // The last stop bit of the reply left at `now_us`.
-  void reply_sent(std::uint32_t now_us) {
-    if (!server_.is_sending()) return;
-    server_.reply_sent(true);
-    reply_end_us_ = now_us;
+  // The last stop bit of the reply has left.
+  void reply_sent() {
+    server_.reply_sent();
     apply_requested_config();
   }
 
@@ -125,17 +117,6 @@ class RtuPort {
   [[nodiscard]] const RtuReceiverCounters& receiver_counters() const { return receiver_.counters(); }
 
  private:
-  // Decides by the beginning of the character: what began before the reply's last stop bit had left cannot be
-  // a request.
-  bool is_echo(std::uint32_t time_us) {
-    if (!config_.half_duplex) return false;
-    if (server_.is_sending()) return true;
-    if (!server_.is_settling()) return false;
-    if (elapsed_us(time_us, reply_end_us_) < receiver_.timing().character_us) return true;
-    server_.settled();
-    return false;
-  }
-
   void handle(const RtuFrame& frame) {
     server_.handle(frame, config_.unit, receiver_.counters());
     apply_requested_config();
@@ -147,7 +128,7 @@ class RtuPort {
   }
 
   void apply_requested_config() {
-    if (!requested_config_ || !(server_.is_idle() || server_.is_settling())) return;
+    if (!requested_config_ || !server_.is_idle()) return;
     const bool line_changes =
         requested_config_->baud_rate != config_.baud_rate || requested_config_->format != config_.format;
     config_ = *requested_config_;
@@ -159,7 +140,6 @@ class RtuPort {
   RtuPortConfig config_;
   RtuReceiver receiver_;
   std::optional<RtuPortConfig> requested_config_;
-  std::uint32_t reply_end_us_ = 0;
 };
 
 }  // namespace kmax::firmware::modbus

@@ -93,18 +93,12 @@ class UnitServer {
     ++counters_.replies;
     return std::span(reply_).first(reply_size_);
   }
-  // `settles`: what the line still brings of it is no request, until settled().
-  void reply_sent(bool settles = false) {
-    if (state_ == State::sending) state_ = settles ? State::settling : State::idle;
-  }
-  void settled() {
-    if (state_ == State::settling) state_ = State::idle;
+  void reply_sent() {
+    if (state_ == State::sending) state_ = State::idle;
   }
 
-  // No request is being carried out, and no reply waits, is being sent or settles.
+  // No request is being carried out, and no reply waits or is being sent.
   [[nodiscard]] bool is_idle() const { return state_ == State::idle; }
-  [[nodiscard]] bool is_settling() const { return state_ == State::settling; }
-  [[nodiscard]] bool is_sending() const { return state_ == State::sending; }
   // End of the latest frame for this unit or for all; nothing before the first.
   [[nodiscard]] std::optional<std::uint32_t> last_valid_request_time() const {
     return last_valid_request_us_;
@@ -117,7 +111,6 @@ class UnitServer {
     executing,      // the bank is being called
     reply_waiting,  // for take_reply()
     sending,        // until reply_sent()
-    settling,       // the echo of its last character may still come in
   };
 
   // The very tagged write, tag and all, that the reply in the buffer is the answer to: the client has not got

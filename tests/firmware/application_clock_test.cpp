@@ -62,8 +62,8 @@ class BareBoard {
     application->poll(now);
     const auto reply = application->serial().reply_due(now);
     const Bytes bytes(reply.begin(), reply.end());
-    application->serial().reply_sent(now);
-    now += 200;  // the echo's time
+    application->serial().reply_sent();
+    now += 200;
     if (bytes.size() != 9) return -12345;
     return number_in(name, {static_cast<std::uint16_t>(bytes[3] << 8 | bytes[4]),
                             static_cast<std::uint16_t>(bytes[5] << 8 | bytes[6])});

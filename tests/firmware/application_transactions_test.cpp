@@ -89,7 +89,7 @@ class Device {
     wait_us(5'000);
     const auto reply = application_->serial().reply_due(now_);
     reply_.assign(reply.begin(), reply.end());
-    application_->serial().reply_sent(now_);
+    application_->serial().reply_sent();
     wait_us(5'000);
     if (reply_.size() < 5) throw std::runtime_error("no reply");
     return (reply_[1] & 0x80) != 0 ? reply_[2] : 0;

@@ -108,7 +108,7 @@ class WatchedApplication {
       sending_ = true;
       reply_until_us_ = now_us_ + 2'000;
     } else if (sending_ && now_us_ >= reply_until_us_) {
-      application_->serial().reply_sent(now);
+      application_->serial().reply_sent();
       sending_ = false;
     }
     if (application_->can().restart_wanted()) power_on();

@@ -38,25 +38,24 @@ struct RtuClient {
     return Bytes(reply.begin(), reply.end());
   }
 
-  // Fetches a reply and plays it out, with its echo if the line has two wires.
-  Bytes take_reply(bool echo = false) {
+  // Fetches a reply and plays it out.
+  Bytes take_reply() {
     const std::span<const std::uint8_t> reply = port.reply_due(line.now());
     Bytes bytes(reply.begin(), reply.end());
     if (bytes.empty()) return bytes;
-    for (const std::uint8_t byte : bytes) {
-      const std::uint32_t end = line.character();
-      if (echo) port.receive(byte, false, end);
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      line.character();
       EXPECT_TRUE(reply_due().empty());
     }
     EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), reply.begin()));
-    port.reply_sent(line.now());
+    port.reply_sent();
     return bytes;
   }
 
-  Bytes exchange(const Bytes& request, bool echo = false) {
+  Bytes exchange(const Bytes& request) {
     send(request);
     settle();
-    return take_reply(echo);
+    return take_reply();
   }
 
   // After the silence that follows a reply.
@@ -114,35 +113,10 @@ TEST_P(RtuPortAtBaud, ReplyIsDueNotBeforeT3_5AndOnlyOnce) {
   }
 }
 
-TEST_P(RtuPortAtBaud, EchoOfTheReplyIsIgnored) {
-  RtuClient client({.unit = 1, .baud_rate = GetParam()}, 0xFFFF'FF00);
-  // The echo of a write single is a good request for this unit.
-  for (std::uint32_t i = 1; i <= 3; ++i) {
-    EXPECT_EQ(client.exchange(adu(1, write_pdu), true), adu(1, write_pdu));
-    client.settle();
-    EXPECT_TRUE(client.take_reply().empty());
-    EXPECT_EQ(client.bank.writes, static_cast<int>(i));
-  }
-  EXPECT_EQ(client.port.receiver_counters().frames_received, 3U);
-  EXPECT_EQ(client.port.receiver_counters().crc_errors, 0U);
-}
-
-// The echo of the last character may be handed over after reply_sent(), with a time stamp on either side of
-// it.
-TEST_P(RtuPortAtBaud, LateEchoOfTheLastCharacterIsIgnored) {
-  for (const int offset : {-3, -1, 0, 1, 3}) {
-    RtuClient client({.unit = 1, .baud_rate = GetParam()});
-    (void)client.exchange(adu(1, read_pdu));
-    client.port.receive(0x55, false, client.line.now() + static_cast<std::uint32_t>(offset));
-    EXPECT_TRUE(client.is_alive());
-    EXPECT_EQ(client.port.receiver_counters().undersize, 0U);
-  }
-}
-
 TEST_P(RtuPortAtBaud, RequestThatBeginsRightAfterTheReplyIsServed) {
   RtuClient client({.unit = 1, .baud_rate = GetParam()});
   for (int i = 0; i < 5; ++i) {
-    EXPECT_EQ(client.exchange(adu(1, read_pdu), true), adu(1, read_reply_pdu));
+    EXPECT_EQ(client.exchange(adu(1, read_pdu)), adu(1, read_reply_pdu));
     client.line.silence(1.0);
   }
 }
@@ -457,24 +431,22 @@ TEST(RtuPort, ChangeOfTheUnitAloneLeavesAFrameUnderWayIntact) {
 
 // The bank configures the port from inside the write, as modbus.unit and modbus.baud_rate do.
 TEST(RtuPort, WriteThatReconfiguresIsAnsweredUnderTheOldConfiguration) {
-  for (const bool echo : {false, true}) {
-    RtuClient client({.unit = 1, .baud_rate = 115200});
-    const RtuPortConfig changed{.unit = 42, .baud_rate = 9600};
-    client.bank.on_write = [&] { EXPECT_TRUE(client.port.configure(changed)); };
-    client.send(adu(1, write_pdu));
-    client.settle();
-    EXPECT_EQ(client.port.config().unit, 1);
-    EXPECT_EQ(client.take_reply(echo), adu(1, write_pdu));
-    EXPECT_EQ(client.port.config(), changed);
-    EXPECT_EQ(client.port.timing(), rtu_timing(9600));
-    client.bank.on_write = nullptr;
+  RtuClient client({.unit = 1, .baud_rate = 115200});
+  const RtuPortConfig changed{.unit = 42, .baud_rate = 9600};
+  client.bank.on_write = [&] { EXPECT_TRUE(client.port.configure(changed)); };
+  client.send(adu(1, write_pdu));
+  client.settle();
+  EXPECT_EQ(client.port.config().unit, 1);
+  EXPECT_EQ(client.take_reply(), adu(1, write_pdu));
+  EXPECT_EQ(client.port.config(), changed);
+  EXPECT_EQ(client.port.timing(), rtu_timing(9600));
+  client.bank.on_write = nullptr;
 
-    client.line = RtuLine(9600, client.line.now());
-    client.settle();
-    EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
-    client.settle();
-    EXPECT_EQ(client.exchange(adu(42, read_pdu)), adu(42, written_reply_pdu));
-  }
+  client.line = RtuLine(9600, client.line.now());
+  client.settle();
+  EXPECT_TRUE(client.exchange(adu(1, read_pdu)).empty());
+  client.settle();
+  EXPECT_EQ(client.exchange(adu(42, read_pdu)), adu(42, written_reply_pdu));
 }
 
 TEST(RtuPort, ReconfigurationWaitsForAReplyThatIsBeingSent) {
@@ -486,7 +458,7 @@ TEST(RtuPort, ReconfigurationWaitsForAReplyThatIsBeingSent) {
   EXPECT_TRUE(client.port.configure({.unit = 6}));
   client.port.poll(client.line.now());
   EXPECT_EQ(client.port.config().unit, 1);
-  client.port.reply_sent(client.line.now());
+  client.port.reply_sent();
   EXPECT_EQ(client.port.config().unit, 6);
 }
 
@@ -508,9 +480,9 @@ TEST(RtuPort, ReconfigurationByBroadcastOrWithADroppedReplyIsNotLost) {
 
 TEST(RtuPort, ReplySentWithoutAReplyChangesNothing) {
   RtuClient client;
-  client.port.reply_sent(client.line.now());
+  client.port.reply_sent();
   client.send(adu(1, read_pdu));
-  client.port.reply_sent(client.line.now());
+  client.port.reply_sent();
   client.settle();
   EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
 }
@@ -530,24 +502,23 @@ TEST(RtuPort, AliveAfterLongIdleTimeAndAReplyMayWaitForHours) {
   EXPECT_EQ(client.take_reply(), adu(1, read_reply_pdu));
 }
 
-// On a full-duplex line nothing that comes in is an echo. The driver reports the end of a reply late; the
-// client, which has the last character, goes on at once.
-TEST(RtuPort, OnAFullDuplexLineARequestThatBeginsBeforeTheReplyIsReportedSentIsAnswered) {
-  RtuClient client({.unit = 1, .half_duplex = false});
+// The driver reports the end of a reply late; the client, which has the last character, goes on at once.
+TEST(RtuPort, ARequestThatBeginsBeforeTheReplyIsReportedSentIsAnswered) {
+  RtuClient client;
   const Bytes request = adu(1, read_pdu);
   client.send(request);
   for (int i = 0; i < 10; ++i) {
     client.settle();
     ASSERT_EQ(client.reply_due(), adu(1, read_reply_pdu));
     client.send(beginning_of(request));
-    client.port.reply_sent(client.line.now());
+    client.port.reply_sent();
     client.send(rest_of(request));
   }
   EXPECT_EQ(client.port.receiver_counters().crc_errors, 0U);
 }
 
-TEST(RtuPort, OnAFullDuplexLineARequestCompleteWhileSendingLeavesTheReplyAlone) {
-  RtuClient client({.unit = 1, .half_duplex = false});
+TEST(RtuPort, ARequestCompleteWhileSendingLeavesTheReplyAlone) {
+  RtuClient client;
   client.send(adu(1, read_pdu));
   client.settle();
   const auto reply = client.port.reply_due(client.line.now());
@@ -556,7 +527,7 @@ TEST(RtuPort, OnAFullDuplexLineARequestCompleteWhileSendingLeavesTheReplyAlone) 
   client.settle();
   EXPECT_EQ(Bytes(reply.begin(), reply.end()), before);
   EXPECT_EQ(client.bank.writes, 0);
-  client.port.reply_sent(client.line.now());
+  client.port.reply_sent();
   EXPECT_TRUE(client.is_alive());
 }
 
@@ -580,7 +551,6 @@ Bytes some_request(std::uint8_t unit) {
 // CRC, never a change with an exception, and the next good request is answered.
 RC_GTEST_PROP(RtuPort, DamagedTrafficIsHarmless, ()) {
   const auto start = *rc::gen::element<std::uint32_t>(0, 0xFFFF'0000, 0x7FFF'0000);
-  const auto echo = *rc::gen::arbitrary<bool>();
   RtuClient client({.unit = 1, .baud_rate = tested_baud_rates[*rc::gen::inRange<std::size_t>(0, 8)]}, start);
   for (int i = 0; i < 10; ++i) {
     Bytes frame = *rc::gen::inRange(0, 4) == 0
@@ -606,7 +576,7 @@ RC_GTEST_PROP(RtuPort, DamagedTrafficIsHarmless, ()) {
     for (std::size_t k = 0; k < frame.size(); ++k)
       client.port.receive(frame[k], k == line_error_at, client.line.character());
     client.settle();
-    const Bytes reply = client.take_reply(echo);
+    const Bytes reply = client.take_reply();
     const bool good = frame.size() >= 4 && frame.size() <= 256 && line_error_at >= frame.size() &&
                       with_crc(Bytes(frame.begin(), frame.end() - 2)) == frame;
     RC_ASSERT(reply.empty() != (good && frame[0] == 1));
@@ -634,7 +604,7 @@ RC_GTEST_PROP(RtuPort, NoiseNeverGetsAReplyAndNeverStopsThePort, ()) {
     client.port.receive(byte, *rc::gen::inRange(0, 100) == 0, client.line.character());
     if (*rc::gen::inRange(0, 10) == 0) client.port.poll(client.line.now());
     if (*rc::gen::inRange(0, 10) == 0) RC_ASSERT(client.reply_due().empty());
-    if (*rc::gen::inRange(0, 50) == 0) client.port.reply_sent(client.line.now());
+    if (*rc::gen::inRange(0, 50) == 0) client.port.reply_sent();
   }
   RC_ASSERT(client.bank.holding == before);
   RC_ASSERT(client.is_alive());

@@ -105,14 +105,14 @@ class HostileLine final : public link::ByteLine {
     const auto reply = port_.reply_due(clock);
     if (reply.empty()) return;
     carry(to_client_, {reply.begin(), reply.end()});
-    port_.reply_sent(clock);
+    port_.reply_sent();
   }
 
   Disturbances disturbances_;
   Time latest_;
   std::mt19937 random_;
   std::shared_ptr<FakeDevice> device_ = std::make_shared<FakeDevice>();
-  firmware::modbus::RtuPort<FakeDevice> port_{*device_, {.half_duplex = false}};
+  firmware::modbus::RtuPort<FakeDevice> port_{*device_};
   Time now_{1'000'000};
   Way to_device_, to_client_;
   int disturbed_ = 0;
