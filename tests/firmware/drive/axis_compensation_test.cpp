@@ -17,6 +17,7 @@ class AxisCompensation : public testing::Test {
     haptic.wall.kind = control::WallKind::plain;
     haptic.velocity.kind = control::VelocityEstimatorKind::difference;
     MotorControlConfig motor;
+    motor.modulation_limit = 0.88f;
     motor.transmission = 0.01f;
     motor.torque_constant = 0.03f;
     setting.haptic = control::HapticLoop<float>::prepare(haptic, 0);

@@ -27,6 +27,7 @@ AxisSetting setting_of(DriveMode mode) {
   haptic.wall.kind = control::WallKind::plain;
   haptic.velocity.kind = control::VelocityEstimatorKind::difference;
   MotorControlConfig motor;
+  motor.modulation_limit = 0.88f;
   motor.transmission = transmission;
   motor.torque_constant = 0.03f;
   AxisSetting setting;
@@ -250,6 +251,7 @@ TEST_F(AxisExcitationTest, PositionKindPullsFromWhereTheHandleWas) {
 // Torque by an angle that nobody knows could be torque the other way, or none.
 TEST_F(AxisExcitationTest, WithoutTheRotorsAngleWhatNeedsItAsksForNothing) {
   MotorControlConfig motor;
+  motor.modulation_limit = 0.88f;
   motor.transmission = transmission;
   motor.torque_constant = 0.03f;
   for (const MotorKind motor_kind : {MotorKind::pmsm, MotorKind::dc}) {

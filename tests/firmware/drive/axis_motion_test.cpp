@@ -84,6 +84,7 @@ AxisSetting setting_of(MotorKind kind, DriveMode mode, double electrical_offset 
   haptic.force.ramp_time = 0.0f;
   haptic.wall.kind = control::WallKind::plain;
   MotorControlConfig motor;
+  motor.modulation_limit = 0.88f;
   motor.kind = kind;
   motor.transmission = static_cast<float>(transmission);
   motor.torque_constant = static_cast<float>(torque_constant);

@@ -29,6 +29,7 @@ control::TurnFraction fraction(double radians) {
 
 MotorControlConfig configuration(MotorKind kind) {
   MotorControlConfig config;
+  config.modulation_limit = 0.88f;
   config.kind = kind;
   config.transmission = 0.01f;
   config.torque_constant = 0.03f;

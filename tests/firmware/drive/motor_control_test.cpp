@@ -14,6 +14,7 @@ constexpr double turn = 6.283185307179586;
 
 MotorControlConfig dc() {
   MotorControlConfig config;
+  config.modulation_limit = 0.88f;
   config.transmission = 0.01f;
   config.torque_constant = 0.03f;
   return config;
