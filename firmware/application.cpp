@@ -14,25 +14,9 @@ Application::Application(const BoardIdentity& board, std::span<std::uint32_t> ca
                  .lock = lock_,
                  .axes = axes_,
                  .links = {LinkReadings(serial_), LinkReadings(can_), LinkReadings(usb_)}}),
-      serial_({.board = board_,
-               .parameters = parameters_,
-               .writes = writes_,
-               .readings = readings_,
-               .axes = axes_,
-               .state = links_[Link::serial]}),
-      can_({.board = board_,
-            .parameters = parameters_,
-            .store = store_,
-            .writes = writes_,
-            .readings = readings_,
-            .axes = axes_,
-            .links = links_}),
-      usb_({.board = board_,
-            .parameters = parameters_,
-            .writes = writes_,
-            .readings = readings_,
-            .axes = axes_,
-            .state = links_[Link::usb]}) {
+      serial_(link_sources()),
+      can_(link_sources()),
+      usb_(link_sources()) {
   readings_.refresh();
 }
 

@@ -127,6 +127,7 @@ class Application {
   float ISR_background_force(std::size_t axis) const { return axes_.tick().ISR_background_force(axis); }
 
  private:
+  LinkSources link_sources() { return {board_, parameters_, store_, writes_, readings_, axes_, links_}; }
   // Rare: small code rather than fast code.
   [[gnu::cold]] void go_on_saving(std::uint32_t now_us);
 

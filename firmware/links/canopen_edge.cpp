@@ -4,21 +4,14 @@
 
 namespace kmax::firmware {
 
-CanopenEdge::CanopenEdge(const Sources& sources)
+CanopenEdge::CanopenEdge(const LinkSources& sources)
     : parameters_(sources.parameters),
       store_(sources.store),
       writes_(sources.writes),
       axes_(sources.axes),
       links_(sources.links),
       state_(links_[Link::can]),
-      objects_({.board = sources.board,
-                .parameters = sources.parameters,
-                .store = sources.store,
-                .writes = sources.writes,
-                .readings = sources.readings,
-                .axes = sources.axes,
-                .links = sources.links,
-                .node = node_}),
+      objects_(sources, node_),
       node_(objects_,
             {.vendor = vendor_id,
              .product = product_code,

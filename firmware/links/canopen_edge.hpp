@@ -36,17 +36,7 @@ class RoundClock {
 /// The receive interrupt calls ISR_frame(), which the tick may preempt; all else is the main loop's.
 class CanopenEdge {
  public:
-  /// See CanopenObjects::Sources.
-  struct Sources {
-    const BoardIdentity& board;
-    ParameterAccess& parameters;
-    StoreCommands& store;
-    HostWrites& writes;
-    Readings& readings;
-    Axes& axes;
-    LinkStates& links;
-  };
-  explicit CanopenEdge(const Sources& sources);
+  explicit CanopenEdge(const LinkSources& sources);
   CanopenEdge(const CanopenEdge&) = delete;
   CanopenEdge& operator=(const CanopenEdge&) = delete;
 

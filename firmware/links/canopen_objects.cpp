@@ -106,7 +106,7 @@ Abort CanopenObjects::special_size(const canopen::SpecialPlace& place, std::uint
       return Abort::none;
     case SpecialObject::error_history:
       size = 4;
-      return subindex <= of_.node.emergency().history_count() ? Abort::none : Abort::no_subindex;
+      return subindex <= node_.emergency().history_count() ? Abort::none : Abort::no_subindex;
     case SpecialObject::device_type:
     case SpecialObject::store_parameters:
     case SpecialObject::restore_defaults:
@@ -147,7 +147,7 @@ Abort CanopenObjects::read_begin(ObjectAddress address, std::uint32_t& size) {
 }
 
 std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const {
-  const auto& emergency = of_.node.emergency();
+  const auto& emergency = node_.emergency();
   switch (place.what) {
     case SpecialObject::device_type:
       return device_type_of_several_axes;
@@ -158,9 +158,9 @@ std::uint32_t CanopenObjects::number_of(const canopen::SpecialPlace& place, std:
     case SpecialObject::error_history:
       return emergency.history_at(subindex - 1U);
     case SpecialObject::sdo_request:
-      return canopen::cob_id::sdo_request + of_.node.node_id();
+      return canopen::cob_id::sdo_request + node_.node_id();
     case SpecialObject::sdo_response:
-      return canopen::cob_id::sdo_response + of_.node.node_id();
+      return canopen::cob_id::sdo_response + node_.node_id();
     case SpecialObject::store_parameters:
     case SpecialObject::restore_defaults:
       return 1;  // on command
@@ -275,7 +275,7 @@ Abort CanopenObjects::write_special(const canopen::SpecialPlace& place, std::spa
         return abort_for(Refusal::locked, {}, 0);
       }
       if (in[0] != 0) return Abort::value_range;
-      of_.node.emergency().erase_history();
+      node_.emergency().erase_history();
       return Abort::none;
     case SpecialObject::store_parameters:
       if (little_endian(in) != signature_save) return Abort::not_transferred;
@@ -313,7 +313,7 @@ Abort CanopenObjects::write_slot(std::size_t slot, std::uint32_t raw, Link by) {
 Abort CanopenObjects::set_slot(std::size_t slot, std::uint32_t raw, Link by) {
   const SlotDescriptor& descriptor = descriptors[owner_of(slot).entry];
   if (!descriptor.writable) {
-    const std::uint8_t node_id = of_.node.node_id();
+    const std::uint8_t node_id = node_.node_id();
     // Locked comes first: what would be right in another order of writes, or not, is no matter then.
     const Abort abort = of_.parameters.locked()
                             ? Abort::none
@@ -333,7 +333,7 @@ void CanopenObjects::refresh() {
 
 std::uint32_t CanopenObjects::value(std::size_t slot) const {
   const std::uint32_t raw = of_.parameters.values().raw(slot);
-  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, of_.node.node_id()) : raw;
+  return canopen::is_communication(slot) ? canopen::shown_communication(slot, raw, node_.node_id()) : raw;
 }
 
 bool CanopenObjects::take(std::size_t slot, std::uint32_t raw) {

@@ -5,14 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "firmware/board_interface/board_identity.hpp"
 #include "firmware/canopen/object_places.hpp"
-#include "firmware/command/axes.hpp"
-#include "firmware/command/host_writes.hpp"
-#include "firmware/command/parameter_access.hpp"
-#include "firmware/command/store_commands.hpp"
-#include "firmware/drive/link_states.hpp"
-#include "firmware/links/readings.hpp"
+#include "firmware/links/link_sources.hpp"
 #include "firmware/object_dictionary/special_objects.hpp"
 
 namespace kmax::firmware {
@@ -29,18 +23,9 @@ class Node;
 /// as Modbus registers, and refusal.reason says why one was refused on either link. Main loop only.
 class CanopenObjects {
  public:
-  /// What the objects stand for. The node is used from the first request on, not before.
-  struct Sources {
-    const BoardIdentity& board;
-    ParameterAccess& parameters;
-    StoreCommands& store;
-    HostWrites& writes;
-    Readings& readings;
-    Axes& axes;  ///< their trace, captures and fault log
-    LinkStates& links;
-    canopen::Node<CanopenObjects>& node;
-  };
-  explicit CanopenObjects(const Sources& sources) : of_(sources) {}
+  /// The node is used from the first request on, not before.
+  CanopenObjects(const LinkSources& sources, canopen::Node<CanopenObjects>& node)
+      : of_(sources), node_(node) {}
   CanopenObjects(const CanopenObjects&) = delete;
   CanopenObjects& operator=(const CanopenObjects&) = delete;
 
@@ -78,7 +63,8 @@ class CanopenObjects {
   std::uint32_t number_of(const canopen::SpecialPlace& place, std::uint8_t subindex) const;
   std::span<const char> text_of(SpecialObject what) const;
 
-  Sources of_;
+  LinkSources of_;
+  canopen::Node<CanopenObjects>& node_;
   Place found_;  // the last one: a transfer asks several times for the same
   std::array<std::uint8_t, scratch_bytes> scratch_{};
   std::uint32_t scratch_size_ = 0, scratch_version_ = 0;

@@ -11,16 +11,10 @@ modbus::RtuPortConfig port_configuration(const ParameterValues& values) {
 }
 }  // namespace
 
-ModbusEdge::ModbusEdge(const Sources& sources)
+ModbusEdge::ModbusEdge(const LinkSources& sources)
     : parameters_(sources.parameters),
-      state_(sources.state),
-      registers_({.board = sources.board,
-                  .parameters = sources.parameters,
-                  .writes = sources.writes,
-                  .readings = sources.readings,
-                  .axes = sources.axes,
-                  .state = sources.state,
-                  .link = Link::serial}),
+      state_(sources.links[Link::serial]),
+      registers_(sources, Link::serial),
       port_(registers_, port_configuration(parameters_.values())) {}
 
 void ModbusEdge::poll(std::uint32_t now_us) {

@@ -20,16 +20,7 @@ struct SerialSettings {
 /// The receive interrupt calls ISR_byte(), which the tick may preempt; all else is the main loop's.
 class ModbusEdge {
  public:
-  /// See ModbusRegisters::Sources.
-  struct Sources {
-    const BoardIdentity& board;
-    ParameterAccess& parameters;
-    HostWrites& writes;
-    Readings& readings;
-    Axes& axes;
-    LinkState& state;
-  };
-  explicit ModbusEdge(const Sources& sources);
+  explicit ModbusEdge(const LinkSources& sources);
   ModbusEdge(const ModbusEdge&) = delete;
   ModbusEdge& operator=(const ModbusEdge&) = delete;
 

@@ -180,7 +180,7 @@ Exception ModbusRegisters::write_holding(std::uint16_t address, std::span<const 
       }
     }
   }
-  return modbus::exception_for(of_.writes.write(wanted.values(), of_.link).refusal);
+  return modbus::exception_for(of_.writes.write(wanted.values(), link_).refusal);
 }
 
 std::string_view ModbusRegisters::identification(std::uint8_t object_id) const {

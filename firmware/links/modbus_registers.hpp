@@ -5,12 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "firmware/board_interface/board_identity.hpp"
-#include "firmware/command/axes.hpp"
-#include "firmware/command/host_writes.hpp"
-#include "firmware/command/parameter_access.hpp"
-#include "firmware/drive/link_states.hpp"
-#include "firmware/links/readings.hpp"
+#include "firmware/links/link_sources.hpp"
 #include "firmware/modbus/register_bank.hpp"
 
 /// Registers and slots, either way: the Modbus edge of ParameterAccess. A value of 32 bits has two registers,
@@ -48,21 +43,12 @@ namespace kmax::firmware {
 /// the capture and the fault log, and the texts of the device identification. Main loop only.
 class ModbusRegisters {
  public:
-  /// What the registers stand for, and the link by which requests come.
-  struct Sources {
-    const BoardIdentity& board;
-    ParameterAccess& parameters;
-    HostWrites& writes;
-    Readings& readings;
-    Axes& axes;        ///< their trace, captures and fault log
-    LinkState& state;  ///< of `link`
-    Link link;
-  };
-  explicit ModbusRegisters(const Sources& sources) : of_(sources) {}
+  /// `link`: by which requests come.
+  ModbusRegisters(const LinkSources& sources, Link link) : of_(sources), link_(link) {}
 
   /// Before what a request asks for: its host lives, and the command to arm needs to know.
   void begin_request(std::uint32_t end_us, bool broadcast) {
-    of_.state.heard_us = end_us;
+    of_.links[link_].heard_us = end_us;
     broadcast_ = broadcast;
   }
   modbus::Exception read_holding(std::uint16_t address, std::span<std::uint16_t> out);
@@ -72,7 +58,8 @@ class ModbusRegisters {
   std::string_view identification(std::uint8_t object_id) const;
 
  private:
-  Sources of_;
+  LinkSources of_;
+  Link link_;
   bool broadcast_ = false;  ///< the request went to every unit
 };
 

@@ -8,17 +8,11 @@ std::uint8_t unit_in(const ParameterValues& values) {
 }
 }  // namespace
 
-UsbModbusEdge::UsbModbusEdge(const Sources& sources)
+UsbModbusEdge::UsbModbusEdge(const LinkSources& sources)
     : parameters_(sources.parameters),
       axes_(sources.axes),
-      state_(sources.state),
-      registers_({.board = sources.board,
-                  .parameters = sources.parameters,
-                  .writes = sources.writes,
-                  .readings = sources.readings,
-                  .axes = sources.axes,
-                  .state = sources.state,
-                  .link = Link::usb}),
+      state_(sources.links[Link::usb]),
+      registers_(sources, Link::usb),
       port_(registers_, unit_in(parameters_.values())) {}
 
 bool UsbModbusEdge::poll() {

@@ -20,16 +20,7 @@ namespace kmax::firmware {
 /// Without a host nothing of this has to be called.
 class UsbModbusEdge {
  public:
-  /// See ModbusRegisters::Sources.
-  struct Sources {
-    const BoardIdentity& board;
-    ParameterAccess& parameters;
-    HostWrites& writes;
-    Readings& readings;
-    Axes& axes;
-    LinkState& state;
-  };
-  explicit UsbModbusEdge(const Sources& sources);
+  explicit UsbModbusEdge(const LinkSources& sources);
   UsbModbusEdge(const UsbModbusEdge&) = delete;
   UsbModbusEdge& operator=(const UsbModbusEdge&) = delete;
 
