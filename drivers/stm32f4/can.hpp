@@ -42,10 +42,9 @@ enum class CanConfigureResult : std::uint8_t {
 };
 
 struct CanConfig {
-  CanBitTiming timing = can_bit_timing<42'000'000, 500'000>();
+  CanBitTiming timing{};  ///< of the board's clock; none is refused
   /// Talks to itself and to nobody else (LBKM with SILM): for the self-test, with the bus untouched.
   bool self_test = false;
-  CanBusOffConfig bus_off{};
   /// Reads of MSR that `configure` waits for each acknowledgement. Leaving initialization takes 11 recessive
   /// bits, 88 us at 125 kbit/s, or 3000 reads.
   std::uint32_t polls = 10'000;
@@ -110,7 +109,7 @@ class Can {
                      can_ier::Fifo0Overrun::mask | can_ier::Fifo1Pending::mask | can_ier::Fifo1Overrun::mask |
                      can_ier::ErrorPassive::mask | can_ier::BusOff::mask | can_ier::Error::mask;
     registers_.mcr = mode;
-    bus_off_.start(config.bus_off);
+    bus_off_.start();
     return wait_until(registers_.msr, can_msr::Initialization::mask, 0, config.polls)
                ? CanConfigureResult::ok
                : CanConfigureResult::waiting_for_idle_bus;

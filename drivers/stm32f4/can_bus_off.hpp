@@ -35,21 +35,14 @@ enum class CanBusOffAction : std::uint8_t {
   resume
 };
 
-struct CanBusOffConfig {
-  std::uint32_t shortest_wait_us = 100'000;
-  std::uint32_t longest_wait_us = 2'000'000;  ///< below 2^31
-  std::uint32_t stable_us = 1'000'000;  ///< on the bus for this long: the next wait is the shortest again
-};
-
 struct CanBusOffCounters {
   std::uint32_t bus_offs = 0;
 };
 
 class CanBusOff {
  public:
-  void start(const CanBusOffConfig& config) {
-    config_ = config;
-    wait_us_ = config.shortest_wait_us;
+  void start() {
+    wait_us_ = shortest_wait_us;
     state_ = CanBusState::joining;
   }
   void stop() { state_ = CanBusState::off; }
@@ -69,9 +62,9 @@ class CanBusOff {
         return CanBusOffAction::none;
       case CanBusState::on_bus:
         if (bus_off) return fall(now_us);
-        if (now_us - since_us_ >= config_.stable_us) {
-          wait_us_ = config_.shortest_wait_us;
-          since_us_ = now_us - config_.stable_us;  // so that the difference never wraps
+        if (now_us - since_us_ >= stable_us) {
+          wait_us_ = shortest_wait_us;
+          since_us_ = now_us - stable_us;  // so that the difference never wraps
         }
         return CanBusOffAction::none;
       case CanBusState::waiting:
@@ -94,7 +87,7 @@ class CanBusOff {
   CanBusOffAction fall(std::uint32_t now_us) {
     ++counters_.bus_offs;
     this_wait_us_ = wait_us_;
-    wait_us_ = std::min(2 * wait_us_, config_.longest_wait_us);
+    wait_us_ = std::min(2 * wait_us_, longest_wait_us);
     enter(CanBusState::waiting, now_us);
     return CanBusOffAction::drop_frames;
   }
@@ -104,7 +97,9 @@ class CanBusOff {
     since_us_ = now_us;
   }
 
-  CanBusOffConfig config_{};
+  static constexpr std::uint32_t shortest_wait_us = 100'000, longest_wait_us = 2'000'000;
+  /// On the bus for this long: the next wait is the shortest again.
+  static constexpr std::uint32_t stable_us = 1'000'000;
   CanBusState state_ = CanBusState::off;
   std::uint32_t since_us_{};
   std::uint32_t wait_us_{}, this_wait_us_{};  ///< of the next bus-off, and of this one

@@ -50,9 +50,6 @@
 namespace kmax::firmware::canopen {
 
 struct SdoConfig {
-  std::uint32_t timeout_us = 1'000'000;
-  /// Less than the client's own time-out, or it gives up first. Not below `timeout_us`: never.
-  std::uint32_t resume_after_us = 250'000;
   /// Segments per block of a download, 1 to 127. Above 31 an initiate in the middle of a block cannot be told
   /// from a segment; with 1, and no CRC, a segment that CAN delivers twice from the next. A block of 31 at 1
   /// Mbit/s lasts about 4 ms, its acknowledgement 0.1 ms.
@@ -119,10 +116,10 @@ class SdoServer {
   void poll(std::uint32_t now_us) {
     if (transfer_ == Transfer::none) return;
     const std::uint32_t silent_us = now_us - last_us_;
-    if (silent_us >= config_.timeout_us) {
+    if (silent_us >= timeout_us) {
       ++counters_.timeouts;
       fail(Abort::timeout);
-    } else if (silent_us >= config_.resume_after_us && !cut_ && transfer_ == Transfer::block_download &&
+    } else if (silent_us >= resume_after_us && !cut_ && transfer_ == Transfer::block_download &&
                block_download_.may_be_cut()) {
       cut_ = true;
       block_download_complete();
@@ -351,6 +348,9 @@ class SdoServer {
   }
 
   Objects* objects_;
+  static constexpr std::uint32_t timeout_us = 1'000'000;
+  /// Less than the client's own time-out, or it gives up first.
+  static constexpr std::uint32_t resume_after_us = 250'000;
   SdoConfig config_;
   SdoChannel channel_;
   Transfer transfer_ = Transfer::none;

@@ -11,7 +11,7 @@ using State = CanBusState;
 
 struct Node {
   Node() {
-    machine.start({});
+    machine.start();
     EXPECT_EQ(poll(0, false, true), Action::none);
     EXPECT_EQ(machine.state(), State::joining);
     EXPECT_TRUE(machine.may_send());

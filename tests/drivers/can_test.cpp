@@ -6,6 +6,8 @@
 
 namespace kmax::drivers::stm32f4::can_test {
 
+constexpr CanConfig at_500k{.timing = can_bit_timing<42'000'000, 500'000>()};
+
 struct FakeTransmitMailbox {
   FakeRegister tir, tdtr, tdlr, tdhr;
 };
@@ -78,7 +80,7 @@ struct Bench {
 
 struct OnTheBus : Bench {
   OnTheBus() {
-    EXPECT_EQ(driver.configure({}, std::array{CanFilter{}}), CanConfigureResult::ok);
+    EXPECT_EQ(driver.configure(at_500k, std::array{CanFilter{}}), CanConfigureResult::ok);
     EXPECT_EQ(driver.poll(0), CanBusState::on_bus);
     aborts = 0;
   }
@@ -112,15 +114,16 @@ TEST(Can, ConfigureInOrder) {
 TEST(Can, SilentHardwareIsNamed) {
   Bench bench;
   bench.acknowledges = false;
-  EXPECT_EQ(bench.driver.configure({}, {}), CanConfigureResult::no_initialization_mode);
+  EXPECT_EQ(bench.driver.configure(at_500k, {}), CanConfigureResult::no_initialization_mode);
   EXPECT_EQ(bench.driver.send({}), CanSendResult::not_on_the_bus);
   EXPECT_EQ(bench.driver.poll(0), CanBusState::off);
 }
 
 TEST(Can, RefusesBadSettings) {
   Bench bench;
-  EXPECT_EQ(bench.driver.configure({.timing = {}}, {}), CanConfigureResult::bad_timing);
-  EXPECT_EQ(bench.driver.configure({}, std::vector<CanFilter>(15)), CanConfigureResult::too_many_filters);
+  EXPECT_EQ(bench.driver.configure({}, {}), CanConfigureResult::bad_timing);
+  EXPECT_EQ(bench.driver.configure(at_500k, std::vector<CanFilter>(15)),
+            CanConfigureResult::too_many_filters);
   EXPECT_TRUE(bench.can.mcr.writes.empty());
   OnTheBus joined;
   EXPECT_EQ(joined.driver.send({.identifier = 0x800}), CanSendResult::bad_frame);

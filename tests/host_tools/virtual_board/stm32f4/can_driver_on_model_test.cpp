@@ -17,6 +17,7 @@ namespace kmax::virtual_board::can_driver_on_model_test {
 using drivers::CanFrame;
 using namespace drivers::stm32f4;
 using testing::RegisterOnModel;
+constexpr CanConfig at_500k{.timing = can_bit_timing<42'000'000, 500'000>()};
 constexpr BoardTime us = units_per_microsecond, ms = 1000 * us;
 
 struct CanOnModel {
@@ -92,7 +93,7 @@ struct CanBench : testing::ModelBench {
       }
     }
   }
-  void configure(const CanConfig& config = {}) {
+  void configure(const CanConfig& config = at_500k) {
     ASSERT_EQ(driver.configure(config, std::array{CanFilter{}}), CanConfigureResult::ok);
     run(2 * ms);
     ASSERT_EQ(driver.state(), CanBusState::on_bus);
@@ -275,7 +276,8 @@ TEST(CanDriverOnModel, AloneOnTheBusIsNotBusOff) {
 TEST(CanDriverOnModel, BusyOrStuckBusIsJoinedLater) {
   CanBench bench;
   bench.bus.set_stuck_dominant(true, bench.now);
-  EXPECT_EQ(bench.driver.configure({}, std::array{CanFilter{}}), CanConfigureResult::waiting_for_idle_bus);
+  EXPECT_EQ(bench.driver.configure(at_500k, std::array{CanFilter{}}),
+            CanConfigureResult::waiting_for_idle_bus);
   bench.run(50 * ms);
   EXPECT_EQ(bench.driver.state(), CanBusState::joining);
   bench.bus.set_stuck_dominant(false, bench.now);
@@ -296,7 +298,7 @@ TEST(CanDriverOnModel, FiltersSortIntoTheFifos) {
   const std::array filters{
       masked({.identifier = 0x600}, {.identifier = 0x780}, 0), can_filter_standard_list(0x000, 0x601, 1),
       masked({.identifier = 0x1234500, .extended = true}, {.identifier = 0x1FFFFF00, .extended = true}, 1)};
-  ASSERT_EQ(bench.driver.configure({}, filters), CanConfigureResult::ok);
+  ASSERT_EQ(bench.driver.configure(at_500k, filters), CanConfigureResult::ok);
   host.send({.identifier = 0x000}, bench.now);
   host.send({.identifier = 0x600}, bench.now);
   host.send({.identifier = 0x601}, bench.now);  // the list takes priority over the mask
