@@ -55,7 +55,7 @@ inline firmware::MotorControlConfig motor_config_of(const simulation::SceneAxis&
   firmware::MotorControlConfig config{
       .transmission = static_cast<float>(axis.encoder.transmission),
       .counts_per_turn = static_cast<std::uint32_t>(axis.encoder.counts_per_turn),
-      .modulation_limit = board::odrive_v3::description.modulation_limit[2]};
+      .modulation_limit = 0.88f};
   if (const auto* motor = std::get_if<simulation::SynchronousMotorConfig>(&*axis.motor)) {
     config.kind = firmware::MotorKind::pmsm;
     config.torque_constant = static_cast<float>(motor->torque_constant);
