@@ -183,7 +183,9 @@ TEST(CurrentSampling, ATriggerThatHasEndedBeforeArmingIsCountedToo) {
 }
 
 TEST(CurrentSampling, SamplingTimesAreThoseOfEachConvertersChannels) {
-  Board board{{.axes = {{{9, 11}, {13, 12}}}, .current_sampling_code = 5}};
+  auto config = with(&CurrentSamplingConfig::axes, {{{9, 11}, {13, 12}}});
+  config.current_sampling_code = 5;
+  Board board{config};
   ASSERT_TRUE(board.sampling.configure(apb2));
   // RM0090: SMPR1 has channels 10 to 18, SMPR2 0 to 9, three bits each.
   EXPECT_EQ(board.adc2.smpr1.value, 5U << 9);

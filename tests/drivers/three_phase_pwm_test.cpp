@@ -159,7 +159,8 @@ TEST(ThreePhasePwm, TellsABreakThatIsHeldAndTurnsItRound) {
 }
 
 TEST(ThreePhasePwm, LegsChangeOnlyWhileDisarmed) {
-  Configured configured{{.legs = {.a = false}}};
+  Configured configured;
+  ASSERT_TRUE(configured.pwm.enable_legs({.a = false}));
   auto& [timer, pwm] = configured;
   EXPECT_EQ(timer.ccer, 0x550U) << "leg A off";
   timer.cr1 = timer.cr1 | 1U;
