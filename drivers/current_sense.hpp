@@ -68,14 +68,14 @@ class CurrentSense {
   constexpr float offset_amperes() const { return (offset_ - middle_code) * amperes_per_code_; }
 
   /// A, positive into the motor. One conversion, one subtraction, one multiplication.
-  constexpr float ISR_amperes(std::uint16_t code) const {
+  constexpr float ISR_amperes(std::uint32_t code) const {
     return (static_cast<float>(code) - offset_) * amperes_per_code_;
   }
 
   /// The true current may be anything beyond what the code says: treat it as over-current. A code below the
   /// lowest wraps, so one comparison is enough.
-  constexpr bool ISR_saturated(std::uint16_t code) const {
-    return std::uint32_t{code} - lowest_linear_code > highest_linear_code - lowest_linear_code;
+  constexpr bool ISR_saturated(std::uint32_t code) const {
+    return code - lowest_linear_code > highest_linear_code - lowest_linear_code;
   }
 
   /// The largest current that reads without saturation in both directions, A.
@@ -166,7 +166,7 @@ class OffsetCalibration {
   }
 
   /// Once per sample of the phase; without effect when the result stands.
-  constexpr OffsetResult ISR_add(std::uint16_t code) {
+  constexpr OffsetResult ISR_add(std::uint32_t code) {
     if (result_ != OffsetResult::running) return result_;
     sum_ += code;
     if (code < smallest_) smallest_ = code;
@@ -180,8 +180,8 @@ class OffsetCalibration {
   constexpr float offset() const {
     return result_ == OffsetResult::running ? 0.0F : static_cast<float>(sum_) * scale_;
   }
-  constexpr std::uint16_t spread() const {
-    return largest_ < smallest_ ? std::uint16_t{0} : static_cast<std::uint16_t>(largest_ - smallest_);
+  constexpr std::uint32_t spread() const {
+    return largest_ < smallest_ ? 0 : largest_ - smallest_;
   }
 
  private:
@@ -198,8 +198,8 @@ class OffsetCalibration {
   float scale_ = 1.0F;
   std::uint32_t sum_ = 0;
   std::uint32_t remaining_ = 0;
-  std::uint16_t smallest_ = 0xFFFF;
-  std::uint16_t largest_ = 0;
+  std::uint32_t smallest_ = 0xFFFF;
+  std::uint32_t largest_ = 0;
   OffsetResult result_ = OffsetResult::running;
 };
 

@@ -62,7 +62,7 @@ class ReferencedQuadratureCounter {
     if (config_.has_index) {
       bool high = index_line();
       if (index_.is_news(high)) [[unlikely]] {
-        if (!ISR_stays([&index_line, high] { return index_line() == high; })) high = !high;
+        if (!ISR_stays([index_line, high] { return index_line() == high; })) high = !high;
       }
       valid = index_.ISR_plausible(count_, high);
       if (index_.learned() && config_.from_index && !referenced_ && !driving) [[unlikely]]

@@ -15,9 +15,9 @@ class SupplyDivider {
  public:
   constexpr explicit SupplyDivider(float ratio) : volts_per_code_(3.3F * (1.0F / 4096.0F) * ratio) {}
 
-  constexpr float volts(std::uint16_t code) const { return static_cast<float>(code) * volts_per_code_; }
+  constexpr float volts(std::uint32_t code) const { return static_cast<float>(code) * volts_per_code_; }
   /// The supply may be anything above what the code says.
-  constexpr bool saturated(std::uint16_t code) const { return code >= 4095; }
+  constexpr bool saturated(std::uint32_t code) const { return code >= 4095; }
 
  private:
   float volts_per_code_;

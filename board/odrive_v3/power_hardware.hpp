@@ -79,7 +79,7 @@ class PowerHardware {
   /// For the length of a pulse.
   void set_brake(bool on) { on ? brake_.start() : brake_.stop(); }
 
-  std::uint16_t supply_code() const { return sampling_.supply(); }
+  std::uint32_t supply_code() const { return sampling_.supply(); }
   std::uint16_t temperature_code(std::size_t axis) const {
     return sampling_.temperature(static_cast<unsigned>(axis));
   }

@@ -18,13 +18,13 @@ class CurrentSensors {
   constexpr explicit CurrentSensors(float shunt_ohm)
       : sense_b_({shunt_ohm, drivers::CurrentSenseGain::x80}), sense_c_(sense_b_), shunt_ohm_(shunt_ohm) {}
 
-  bool ISR_saturated(std::uint16_t code_b, std::uint16_t code_c) const {
+  bool ISR_saturated(std::uint32_t code_b, std::uint32_t code_c) const {
     return sense_b_.ISR_saturated(code_b) || sense_c_.ISR_saturated(code_c);
   }
-  float ISR_amperes_b(std::uint16_t code) const { return sense_b_.ISR_amperes(code); }
-  float ISR_amperes_c(std::uint16_t code) const { return sense_c_.ISR_amperes(code); }
+  float ISR_amperes_b(std::uint32_t code) const { return sense_b_.ISR_amperes(code); }
+  float ISR_amperes_c(std::uint32_t code) const { return sense_c_.ISR_amperes(code); }
   /// A sample that is valid counts in the calibration.
-  void ISR_calibrate(bool valid, std::uint16_t code_b, std::uint16_t code_c) {
+  void ISR_calibrate(bool valid, std::uint32_t code_b, std::uint32_t code_c) {
     if (!valid) return;
     offset_b_.ISR_add(code_b);
     offset_c_.ISR_add(code_c);

@@ -31,16 +31,16 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   /// Codes of the phase currents of an axis and of the supply, of 12 bits. `slow_age`: ticks since the supply
   /// was converted last.
   { hardware.ISR_sample(axis).valid } -> std::convertible_to<bool>;
-  { hardware.ISR_sample(axis).phase_b } -> std::convertible_to<std::uint16_t>;
-  { hardware.ISR_sample(axis).phase_c } -> std::convertible_to<std::uint16_t>;
-  { hardware.ISR_sample(axis).supply } -> std::convertible_to<std::uint16_t>;
+  { hardware.ISR_sample(axis).phase_b } -> std::convertible_to<std::uint32_t>;
+  { hardware.ISR_sample(axis).phase_c } -> std::convertible_to<std::uint32_t>;
+  { hardware.ISR_sample(axis).supply } -> std::convertible_to<std::uint32_t>;
   { hardware.ISR_sample(axis).slow_age } -> std::convertible_to<std::uint8_t>;
 
   /// Any context: the last codes of the same pins while the axis' high sides conduct, or all its switches are
   /// off. The amplifiers have settled then as far as they have at the other end of the period, since duties
   /// lie as far above 0 as below 1.
-  { hardware.zero_current(axis).phase_b } -> std::convertible_to<std::uint16_t>;
-  { hardware.zero_current(axis).phase_c } -> std::convertible_to<std::uint16_t>;
+  { hardware.zero_current(axis).phase_b } -> std::convertible_to<std::uint32_t>;
+  { hardware.zero_current(axis).phase_c } -> std::convertible_to<std::uint32_t>;
 
   /// The free-running counter of the axis' quadrature lines, and its index line at the same moment.
   { constant.ISR_counter(axis) } -> std::unsigned_integral;
@@ -50,7 +50,7 @@ concept DriveHardware = requires(Hardware& hardware, const Hardware& constant, s
   {hardware.set_brake(level)};
 
   // Main loop: codes converted last, and ticks that came too late or not at all.
-  { constant.supply_code() } -> std::same_as<std::uint16_t>;
+  { constant.supply_code() } -> std::convertible_to<std::uint32_t>;
   { constant.temperature_code(axis) } -> std::same_as<std::uint16_t>;
   { constant.missed_ticks() } -> std::same_as<std::uint32_t>;
 };

@@ -221,8 +221,8 @@ class Drives {
   [[gnu::noinline, gnu::cold]] firmware::Fault ISR_why_fallen(std::size_t axis) {
     return ISR_ticks_stayed_away(axis) ? firmware::Fault::tick_missed : firmware::Fault::power_stage;
   }
-  [[gnu::noinline, gnu::cold]] bool ISR_holds(std::size_t axis, bool valid, std::uint16_t phase_b,
-                                              std::uint16_t phase_c) {
+  [[gnu::noinline, gnu::cold]] bool ISR_holds(std::size_t axis, bool valid, std::uint32_t phase_b,
+                                              std::uint32_t phase_c) {
     const SampleHold::Action action = samples_.ISR_take(axis);
     if (action.calibrate) axes_[axis].sensors.ISR_calibrate(valid, phase_b, phase_c);
     return action.hold;

@@ -64,12 +64,12 @@ struct CurrentSamplingConfig {
   std::uint8_t slow_sampling_code;           // likewise, of supply and temperatures
 };
 
-/// Codes are 0 to 4095, 3.3 V full scale.
+/// Codes are 0 to 4095, 3.3 V full scale; words, as the registers are, which a tick need not cut.
 struct CurrentSample {
   bool valid = false;  ///< phase_b and phase_c are of the axis asked for, and of one trigger
-  std::uint16_t phase_b = 0;
-  std::uint16_t phase_c = 0;
-  std::uint16_t supply = 0;
+  std::uint32_t phase_b = 0;
+  std::uint32_t phase_c = 0;
+  std::uint32_t supply = 0;
   /// Reads since ADC1 finished a sequence: 0 normally, 1 after a late interrupt, more means that ADC1 stands
   /// still and the slow codes are old. Stays at 255.
   std::uint8_t slow_age = 0;
@@ -151,40 +151,31 @@ class CurrentSampling {
       sample.slow_age = slow_age_;
       return sample;
     }
-    const bool phase_c_finished = finished(adc3_);
+    const std::uint32_t phase_c_flags = word(adc3_.sr);
     // Before the data is read: a conversion that ends from here on shows in the flags again.
     adc2_.sr = flags_cleared;
     adc3_.sr = flags_cleared;
-    sample.phase_b = code(adc2_.jdr[0]);
-    sample.phase_c = code(adc3_.jdr[0]);
+    sample.phase_b = word(adc2_.jdr[0]);
+    sample.phase_c = word(adc3_.jdr[0]);
     // Also of a trigger out of step, whose codes a current may have made: who follows them must be slow.
-    zero_current_[axis ^ 1U] = {static_cast<std::uint32_t>(adc2_.jdr[1]),
-                                static_cast<std::uint32_t>(adc3_.jdr[1])};
+    zero_current_[axis ^ 1U] = {word(adc2_.jdr[1]), word(adc3_.jdr[1])};
     const unsigned converted_axis = axis_in_force_;
     arm_lists(axis ^ 1U);
-    const bool disturbed = (static_cast<std::uint32_t>(adc2_.sr) &
-                            (adc_sr::InjectedStarted::mask | adc_sr::InjectedEnd::mask)) != 0;
-    // That trigger may have come before or after its list was written: its sample belongs to nobody.
-    if (disturbed) [[unlikely]]
-      axis_in_force_ = none;
-
-    if (disturbed || axis == last_axis_) [[unlikely]]
-      ++counters_.overruns;
-    if (converted_axis != axis) [[unlikely]]
-      ++counters_.axis_mismatches;
-    if (!phase_c_finished) [[unlikely]]
-      ++counters_.missing_phase_c;
+    const std::uint32_t flags_since = word(adc2_.sr);
+    sample.valid = (flags_since & started_or_ended) == 0 && converted_axis == axis &&
+                   (phase_c_flags & adc_sr::InjectedEnd::mask) != 0;
+    if (!sample.valid) [[unlikely]]
+      count_fault(axis, converted_axis, phase_c_flags, flags_since);
     last_axis_ = axis;
-    sample.valid = !disturbed && converted_axis == axis && phase_c_finished;
     sample.slow_age = read_slow();
     sample.supply = supply_;
     return sample;
   }
 
   /// Of the last trigger, 0 before the first; written by the interrupt, for other contexts.
-  std::uint16_t supply() const { return supply_; }
+  std::uint32_t supply() const { return supply_; }
   /// Of an axis' power stage, converted last. Any context; not the interrupt's business.
-  std::uint16_t temperature(unsigned axis) const { return code(adc1_.jdr[1 + axis]); }
+  std::uint16_t temperature(unsigned axis) const { return static_cast<std::uint16_t>(word(adc1_.jdr[1 + axis])); }
   /// Written by the interrupt. Zeros before the other axis' first read.
   const ZeroCurrentCodes& zero_current(unsigned axis) const { return zero_current_[axis]; }
   /// Written by the interrupt; each is a word that another context may read.
@@ -197,9 +188,10 @@ class CurrentSampling {
   };
   static constexpr std::uint32_t prescaler = 4;
   static constexpr unsigned none = 2;
+  static constexpr std::uint32_t started_or_ended = adc_sr::InjectedStarted::mask | adc_sr::InjectedEnd::mask;
   /// Writing 0 clears, 1 leaves alone.
   static constexpr std::uint32_t flags_cleared =
-      adc_sr::all & ~(adc_sr::InjectedEnd::mask | adc_sr::InjectedStarted::mask);
+      adc_sr::all & ~started_or_ended;
 
   template <unsigned count>
   static constexpr std::uint32_t list_of(const std::array<std::uint8_t, count>& channels) {
@@ -241,14 +233,24 @@ class CurrentSampling {
   }
 
   static bool finished(const Adc& adc) { return adc_sr::InjectedEnd::read(adc.sr) != 0; }
-  static std::uint16_t code(const Register auto& data) {
-    return static_cast<std::uint16_t>(static_cast<std::uint32_t>(data));
-  }
+  static std::uint32_t word(const Register auto& data) { return static_cast<std::uint32_t>(data); }
 
   void arm_lists(unsigned axis) {
     adc2_.jsqr = lists_[axis].adc2;
     adc3_.jsqr = lists_[axis].adc3;
     axis_in_force_ = axis;
+  }
+
+  /// Why a sample is not valid. Two triggers of one axis in a row are a mismatch as well, since the lists
+  /// change at each read.
+  [[gnu::noinline, gnu::cold]] void count_fault(unsigned axis, unsigned converted_axis,
+                                                std::uint32_t phase_c_flags, std::uint32_t flags_since) {
+    const bool disturbed = (flags_since & started_or_ended) != 0;
+    // That trigger may have come before or after its list was written: its sample belongs to nobody.
+    if (disturbed) axis_in_force_ = none;
+    if (disturbed || axis == last_axis_) ++counters_.overruns;
+    if (converted_axis != axis) ++counters_.axis_mismatches;
+    if ((phase_c_flags & adc_sr::InjectedEnd::mask) == 0) ++counters_.missing_phase_c;
   }
 
   /// Their age.
@@ -258,7 +260,7 @@ class CurrentSampling {
       return slow_age_;
     }
     adc1_.sr = flags_cleared;
-    supply_ = code(adc1_.jdr[0]);
+    supply_ = word(adc1_.jdr[0]);
     slow_age_ = 0;
     return 0;
   }
@@ -271,7 +273,7 @@ class CurrentSampling {
   std::array<Lists, 2> lists_{};
   unsigned axis_in_force_ = none;
   unsigned last_axis_ = none;
-  std::uint16_t supply_ = 0;
+  std::uint32_t supply_ = 0;
   std::uint8_t slow_age_ = 0;
   std::array<ZeroCurrentCodes, 2> zero_current_{};
   CurrentSamplingCounters counters_{};
