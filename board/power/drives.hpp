@@ -256,7 +256,8 @@ inline const firmware::AxisInput& Drives<Hardware>::ISR_measure(std::size_t inde
   const Settings& settings = index == first_axis() ? double_buffer_.ISR_take() : double_buffer_.ISR_current();
   const auto sample = hardware_.ISR_sample(index);
   firmware::AxisInput& input = axis.input;
-  const bool driving = axis.bridge == Bridge::driving;
+  const Bridge bridge = axis.bridge;
+  const bool driving = bridge == Bridge::driving;
   firmware::Fault condition = firmware::Fault::none;
   // 2 triggers are 50 us: the converter of supply and temperatures stands still.
   if (!sample.valid || sample.slow_age > 2) [[unlikely]] {
@@ -278,7 +279,7 @@ inline const firmware::AxisInput& Drives<Hardware>::ISR_measure(std::size_t inde
   input.motor.supply_voltage = supply_.volts(sample.supply);
   ISR_read_count(index, settings, driving);
   // Before the condition: a line interrupt in between must be found as what it is.
-  const bool bridge_fell = axis.bridge != Bridge::off && !(driving && hardware_.bridge(index).armed());
+  const bool bridge_fell = driving ? !hardware_.bridge(index).armed() : bridge != Bridge::off;
   if (const firmware::Fault cause = stage.condition(); cause != firmware::Fault::none) condition = cause;
   // The bridge fell, or would not rise, without anybody saying why.
   if (bridge_fell && condition == firmware::Fault::none) [[unlikely]]

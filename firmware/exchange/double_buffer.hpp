@@ -17,7 +17,9 @@ namespace kmax::firmware {
 template <typename Value>
 class DoubleBuffer {
  public:
-  explicit DoubleBuffer(const Value& initial) : places_{initial, initial} {}
+  explicit DoubleBuffer(const Value& initial) : places_{initial, initial} {
+    held_.store(&places_[0], std::memory_order_relaxed);
+  }
 
   /// Main loop. An offer that has not been taken is withdrawn first and replaced; since the writer cannot
   /// preempt the reader, the place is free from then on. Cost: one copy.
@@ -53,9 +55,10 @@ class DoubleBuffer {
  private:
   Value* free_place(const Value* held) { return held == &places_[0] ? &places_[1] : &places_[0]; }
 
-  std::array<Value, 2> places_;
-  std::atomic<const Value*> held_{&places_[0]};
+  // What each tick reads comes first, where a load reaches it.
+  std::atomic<const Value*> held_{nullptr};
   std::atomic<bool> offered_{false};
+  std::array<Value, 2> places_;
 };
 
 }  // namespace kmax::firmware
