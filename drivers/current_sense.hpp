@@ -180,9 +180,7 @@ class OffsetCalibration {
   constexpr float offset() const {
     return result_ == OffsetResult::running ? 0.0F : static_cast<float>(sum_) * scale_;
   }
-  constexpr std::uint32_t spread() const {
-    return largest_ < smallest_ ? 0 : largest_ - smallest_;
-  }
+  constexpr std::uint32_t spread() const { return largest_ < smallest_ ? 0 : largest_ - smallest_; }
 
  private:
   constexpr OffsetResult judge() const {

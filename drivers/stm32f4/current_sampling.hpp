@@ -175,7 +175,9 @@ class CurrentSampling {
   /// Of the last trigger, 0 before the first; written by the interrupt, for other contexts.
   std::uint32_t supply() const { return supply_; }
   /// Of an axis' power stage, converted last. Any context; not the interrupt's business.
-  std::uint16_t temperature(unsigned axis) const { return static_cast<std::uint16_t>(word(adc1_.jdr[1 + axis])); }
+  std::uint16_t temperature(unsigned axis) const {
+    return static_cast<std::uint16_t>(word(adc1_.jdr[1 + axis]));
+  }
   /// Written by the interrupt. Zeros before the other axis' first read.
   const ZeroCurrentCodes& zero_current(unsigned axis) const { return zero_current_[axis]; }
   /// Written by the interrupt; each is a word that another context may read.
@@ -190,8 +192,7 @@ class CurrentSampling {
   static constexpr unsigned none = 2;
   static constexpr std::uint32_t started_or_ended = adc_sr::InjectedStarted::mask | adc_sr::InjectedEnd::mask;
   /// Writing 0 clears, 1 leaves alone.
-  static constexpr std::uint32_t flags_cleared =
-      adc_sr::all & ~started_or_ended;
+  static constexpr std::uint32_t flags_cleared = adc_sr::all & ~started_or_ended;
 
   template <unsigned count>
   static constexpr std::uint32_t list_of(const std::array<std::uint8_t, count>& channels) {
