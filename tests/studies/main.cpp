@@ -6,13 +6,16 @@
 
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <memory>
+#include <sstream>
 
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/provenance.hpp"
 #include "host_tools/report/page.hpp"
 #include "tests/studies/instability.hpp"
 #include "tests/studies/studies.hpp"
+#include "tests/studies/velocity.hpp"
 #include "tests/studies/wall_design.hpp"
 
 namespace kmax::studies {
@@ -76,6 +79,28 @@ void add_wall_design(CLI::App& studies) {
   });
 }
 
+void add_velocity(CLI::App& studies) {
+  CLI::App* app = studies.add_subcommand(
+      "velocity", "Velocity estimators that were tried instead of FOAW: cost, error, largest stiffness.");
+  struct Options {
+    std::string counts;
+    StiffnessRun run;
+  };
+  const auto options = std::make_shared<Options>();
+  options->run.protocol.approach_speeds = {0.1, 0.5};
+  options->run.protocol.pushes = {0.6};
+  app->add_option("--instructions", options->counts, "What instruction_budget.sh printed")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app->add_option("--jobs", options->run.threads, "At a time; all processors without it");
+  app->callback([options] {
+    std::stringstream counts;
+    counts << std::ifstream(options->counts).rdbuf();
+    const auto walls = run_damped_walls(experiment::open_subject_set("clipped").device, options->run);
+    fmt::print("{}", report::markdown(velocity_page(measure_velocity_errors(), walls, counts.str())));
+  });
+}
+
 int run(int count, char** arguments) {
   std::string help = "Studies around the largest stable stiffness of simulated people.\n";
   for (const Study& study : all_studies) help += fmt::format("  {:<13}{}\n", study.name, study.what);
@@ -95,6 +120,7 @@ int run(int count, char** arguments) {
   input.run.threads = 0;
   add_instability(app);
   add_wall_design(app);
+  add_velocity(app);
   CLI11_PARSE(app, count, arguments);
   if (!app.get_subcommands().empty()) return 0;
   for (const std::string& set : sets) input.sets.push_back(experiment::open_subject_set(set));

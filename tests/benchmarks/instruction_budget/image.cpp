@@ -138,6 +138,29 @@ void measure_position(const char* name,
   report(name, counts, budget);
 }
 
+/// Usual: the mean. Motions of every speed, as for FOAW above.
+template <typename Candidate>
+void measure_candidate(const char* name) {
+  static Candidate candidate;
+  Inputs same;
+  Path path;
+  Counts counts;
+  std::uint32_t sum = 0;
+  std::int32_t last = 0;
+  constexpr std::int32_t samples = 36'000;
+  for (std::int32_t i = 0; i < samples; ++i) {
+    const auto place = static_cast<std::int32_t>(path.next(same));
+    Registers arguments{{&candidate, reinterpret_cast<const void*>(static_cast<std::intptr_t>(place - last))},
+                        {}};
+    last = place;
+    const std::uint32_t counted = count(arguments, &candidate_step<Candidate>);
+    counts.add(counted, false);
+    sum += counted;
+  }
+  counts.usual = sum / samples;
+  report(name, counts, 0);
+}
+
 void measure_haptic() {
   static Haptic loop;
   Counts counts;
@@ -279,6 +302,13 @@ int main() {
   measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 225);
   measure_position("32-bit position, tracking              ", &position32_step, Kind::tracking, 0);
   measure_position("32-bit position without velocity       ", &resample_step, Kind::foaw, 0);
+  print("Velocity estimators alone, as docs/velocity_estimators.md compares them: mean and worst\n");
+  measure_candidate<kmax::studies::HeldFoaw<1>>("alone: FOAW                            ");
+  measure_candidate<kmax::studies::HeldFoaw<2>>("alone: FOAW of every second sample     ");
+  measure_candidate<kmax::studies::TwoCones<16>>("alone: two cones                       ");
+  measure_candidate<kmax::studies::IntervalTracking>("alone: interval tracking               ");
+  measure_candidate<kmax::studies::EdgePeriod<16>>("alone: edge period, 16 samples         ");
+  measure_candidate<kmax::studies::EdgePeriod<8>>("alone: edge period, 8 samples          ");
   measure_haptic();
   measure_dc();
   measure_field_oriented();

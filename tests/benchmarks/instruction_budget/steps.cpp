@@ -80,4 +80,15 @@ void field_oriented_double_step(FieldOrientedDouble& controller, const FieldOrie
 }
 }
 
+template <typename Candidate>
+float candidate_step(Candidate& candidate, std::int32_t steps) {
+  return candidate.update(steps);
+}
+template float candidate_step(studies::HeldFoaw<1>&, std::int32_t);
+template float candidate_step(studies::HeldFoaw<2>&, std::int32_t);
+template float candidate_step(studies::TwoCones<16>&, std::int32_t);
+template float candidate_step(studies::IntervalTracking&, std::int32_t);
+template float candidate_step(studies::EdgePeriod<16>&, std::int32_t);
+template float candidate_step(studies::EdgePeriod<8>&, std::int32_t);
+
 }  // namespace kmax::instruction_budget

@@ -12,6 +12,7 @@
 #include "control/velocity_estimator.hpp"
 #include "control/wall_law.hpp"
 #include "tests/benchmarks/instruction_budget/sine_variants.hpp"
+#include "tests/studies/velocity_candidates.hpp"
 
 // The steps of the interrupt path as functions of their own, compiled apart from what calls them: nothing
 // about their arguments is known to the compiler, as in the tick. An argument that the step before leaves in
@@ -76,5 +77,9 @@ void dc_double_step(DcDouble& dc, const DcDouble::Coefficients& c, const DcDoubl
 void field_oriented_double_step(FieldOrientedDouble& controller, const FieldOrientedDouble::Coefficients& c,
                                 const FieldOrientedDouble::Input& in, FieldOrientedDouble::Output& out);
 }
+
+/// Of those that were tried instead of FOAW; in steps.cpp for each.
+template <typename Candidate>
+float candidate_step(Candidate& candidate, std::int32_t steps);
 
 }  // namespace kmax::instruction_budget
