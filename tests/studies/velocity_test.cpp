@@ -1,0 +1,32 @@
+#include "tests/studies/velocity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace kmax::studies::velocity_test {
+
+// What docs/velocity_estimators.md says of the winner.
+TEST(VelocityStudy, TheEdgePeriodIsRightWhereFoawIsNoisyAndAsGoodInImpacts) {
+  constexpr std::size_t edge_period = 4;
+  ASSERT_EQ(velocity_candidates[edge_period].name, "edge period, 16");
+  const auto cases = measure_velocity_errors();
+  ASSERT_EQ(cases.size(), 45U);
+  EXPECT_LT(against_foaw(cases)[edge_period].mean, 0.55);
+  for (const VelocityCase& one : cases) {
+    const double error = one.errors[edge_period].rms, foaw = one.errors[0].rms;
+    SCOPED_TRACE(one.motion + ", " + std::to_string(one.quantum) + ", " + std::to_string(one.rate));
+    const bool slow_on_coarse = one.quantum == 55e-6 && one.rate == 20e3 && one.motion[0] != 'i';
+    EXPECT_LT(error, slow_on_coarse ? foaw / 10.0 : 1.25 * foaw + 1.2e-3);
+  }
+}
+
+TEST(VelocityStudy, FoawsWindowLeapsSoNoSearchCanGoOnFromTheLast) {
+  EXPECT_GT(share_of_leaps(), 0.001);
+}
+
+TEST(VelocityStudy, ACandidateThatWasNotCountedIsNamed) {
+  EXPECT_THROW(velocity_page({}, {}, ""), std::invalid_argument);
+}
+
+}  // namespace kmax::studies::velocity_test
