@@ -22,22 +22,22 @@ Device::Device(std::unique_ptr<link::Link> link, link::Notice notice)
 }
 
 void Device::check_dictionary() {
-  const Parameter wanted[] = {Parameter::of<"info.firmware_version">(),
-                              Parameter::of<"info.dictionary_checksum">()};
-  std::vector<std::uint32_t> found;
+  // The version is asked for only when it is needed: on a slow line a request takes 5 ms.
+  std::uint32_t checksum = 0, version = 0;
   try {
-    found = read(wanted);
+    checksum = read(Parameter::of<"info.dictionary_checksum">());
+    if (checksum == firmware::dictionary_checksum) return;
+    version = read(Parameter::of<"info.firmware_version">());
   } catch (const RefusedError& error) {
     throw DeviceError(
         fmt::format("{}: a device answers, but not as a Kmax controller does ({}); check unit and address",
                     description(), error.what()));
   }
-  if (found[1] == firmware::dictionary_checksum) return;
   throw DeviceError(fmt::format(
       "{}: the device's parameters are not those this program knows (its firmware {} has dictionary {:08X}, "
       "this program has {:08X}); flash the firmware of this program's release, or use the kmax of the "
       "device's release",
-      description(), version_text(found[0]), found[1], firmware::dictionary_checksum));
+      description(), version_text(version), checksum, firmware::dictionary_checksum));
 }
 
 std::vector<std::uint32_t> Device::read(std::span<const Parameter> parameters) {

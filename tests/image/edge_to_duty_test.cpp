@@ -98,9 +98,11 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
   board.run_for(0.02);  // the line falls silent
   const double worst_ticks = virtual_board::seconds(worst) / tick_s;
   std::printf(
-      "%llu of %llu edges answered: worst %.1f us = %.2f ticks, mean %.1f us from edge to active duty\n",
+      "%llu of %llu edges answered: worst %.1f us = %.0f cycles of the core = %.2f ticks, mean %.1f us from "
+      "edge to active duty\n",
       static_cast<unsigned long long>(answered), static_cast<unsigned long long>(edges),
-      virtual_board::seconds(worst) * 1e6, worst_ticks, sum / static_cast<double>(answered) * 1e6);
+      virtual_board::seconds(worst) * 1e6, virtual_board::seconds(worst) * 168e6, worst_ticks,
+      sum / static_cast<double>(answered) * 1e6);
   for (std::size_t axis = 0; axis < 2; ++axis) {
     ASSERT_TRUE(board.bridge_armed(axis))
         << axis << ": error code "

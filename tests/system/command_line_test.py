@@ -244,6 +244,15 @@ class Stopping(unittest.TestCase):
             self.assertEqual(values(), before)
 
 
+class RoundTrips(unittest.TestCase):
+    def test_reading_one_parameter_takes_two(self):
+        """What its dictionary is, and the value: the time of a command on a slow line (docs/modbus.md)."""
+        with Serve() as board:
+            first, second = (int(kmax_json("get", "counters.frames_received", device=board.device)
+                                 ["counters.frames_received"]["value"]) for _ in range(2))
+            self.assertEqual(second - first, 2)
+
+
 class VanishingPort(unittest.TestCase):
     def test_a_server_that_dies_in_mid_command_ends_it_with_a_message(self):
         with Serve() as board:
