@@ -69,7 +69,7 @@ TEST_F(FaultsCommand, ATripIsThereWithItsNumbersAndStaysOverARestart) {
     EXPECT_EQ(fault["unit"], "s");
     EXPECT_GT(fault["tick"], 0.0);
     EXPECT_LT(fault["tick"], tick);
-    EXPECT_EQ(fault["time"].get<double>() * 20000, fault["tick"].get<double>());
+    EXPECT_DOUBLE_EQ(fault["time"].get<double>() * 20000, fault["tick"].get<double>());
     for (const char* key : {"position", "velocity", "force", "current", "supply", "temperature"})
       EXPECT_TRUE(fault[key].is_number()) << key;
     restart();
