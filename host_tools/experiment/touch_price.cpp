@@ -37,7 +37,11 @@ TouchPrice price_of(const TouchSetup& setup) {
   for (std::size_t n = 0; n < touch.size(); ++n) {
     price.depth = std::max(price.depth, -touch[n].position);
     touched = touched || touch[n].position <= 0.0;
-    if (!touched && n > 0) price.work += touch[n - 1].force * (touch[n - 1].position - touch[n].position);
+    price.peak_force = std::max(price.peak_force, touch[n].force);
+    if (n == 0) continue;
+    const double work = touch[n - 1].force * (touch[n - 1].position - touch[n].position);
+    price.touch_work += work;
+    if (!touched) price.work += work;
   }
   price.rate_hardness = rate_hardness_of(touch, setup.wall.tick_rate);
   price.field_at_rest = field_at_rest(setup);

@@ -11,6 +11,10 @@ struct TouchPrice {
   double depth = 0.0;          ///< m, deepest in the wall, from the first contact to the end of the hold
   /// N/m, see rate_hardness.hpp; 0 if the wall was not met, or is left sooner.
   double rate_hardness = 0.0;
+  double peak_force = 0.0;  ///< N, the most that the wall and its field push with, until the end of the hold
+  /// J, from the start to the end of the hold, against field and wall: what is stored and what has been
+  /// damped. What they give back counts as negative; below 0 the touch has got more than it gave.
+  double touch_work = 0.0;
 };
 
 /// Errors: those of simulate_touch(). The surface is at 0, free space above.

@@ -33,12 +33,31 @@ TEST(TouchPrice, AStifferOrDampedWallRisesFasterAndLetsLessDeepIn) {
   EXPECT_LT(soft.rate_hardness, 1.1 * 500.0);
 }
 
+TEST(TouchPrice, OfAHandleAtRestTheWholeTouchHasStoredWhatTheSpringHolds) {
+  // A push of 1 N comes to rest where the spring pushes back with nearly as much; friction may hold the rest.
+  TouchSetup setup = touch(1000.0, 3.0, 0.0);
+  std::vector<TouchSample> samples;
+  simulate_touch(setup, &samples);
+  const double depth = -samples.back().position, stored = 0.5 * 1000.0 * depth * depth;
+  const TouchPrice price = price_of(setup);
+  EXPECT_GT(depth, 0.5e-3);
+  EXPECT_GT(price.touch_work, stored) << "and something has been damped";
+  EXPECT_LT(price.touch_work, 4.0 * stored);
+  EXPECT_GT(price.peak_force, 1000.0 * (price.depth - 55e-6));
+  setup.wall.force.limit = 0.4F;
+  EXPECT_FLOAT_EQ(static_cast<float>(price_of(setup).peak_force), 0.4F);
+  const TouchPrice field = price_of(touch(1000.0, 3.0, 1.0));
+  EXPECT_GT(field.touch_work, field.work);
+}
+
 TEST(TouchPrice, OfAWallThatIsNotMetThereIsNoHardness) {
   TouchSetup setup = touch(1000.0, 0.0, 0.0);
   setup.device.friction = 50.0;
   const TouchPrice price = price_of(setup);
   EXPECT_EQ(price.rate_hardness, 0.0);
   EXPECT_EQ(price.depth, 0.0);
+  EXPECT_EQ(price.peak_force, 0.0);
+  EXPECT_EQ(price.touch_work, 0.0);
 }
 
 }  // namespace kmax::experiment::touch_price_test
