@@ -1,7 +1,9 @@
 // What the project's numerical methods cost and how far they are off, each against its peers. Prints
 // docs/speed_and_error.md and draws its pictures; scripts/speed_and_error calls it.
 //   speed_and_error_benchmark --budget FILE.json --pictures FOLDER
-// FILE.json is what `kmax-board ELF --budget --json` printed. Takes about half a minute. Exit code 1 when a
+//   speed_and_error_benchmark --controller
+// The second prints the section of that alone, as Markdown, with ratios of this very run.
+// FILE.json is what `kmax-board ELF --budget --json` printed. Takes some minutes. Exit code 1 when a
 // file cannot be read or written or gnuplot fails, 2 on wrong usage.
 
 #include <fmt/format.h>
@@ -61,17 +63,24 @@ int main(int argc, char** argv) {
     if (argv[i] == std::string_view("--budget")) budget = argv[i + 1];
     if (argv[i] == std::string_view("--pictures")) pictures = argv[i + 1];
   }
-  if (argc != 5 || budget.empty() || pictures.empty()) {
-    fmt::print(stderr, "usage: speed_and_error_benchmark --budget FILE.json --pictures FOLDER\n");
+  const bool controller_only = argc == 2 && argv[1] == std::string_view("--controller");
+  if (!controller_only && (argc != 5 || budget.empty() || pictures.empty())) {
+    fmt::print(stderr,
+               "usage: speed_and_error_benchmark --budget FILE.json --pictures FOLDER\n"
+               "       speed_and_error_benchmark --controller\n");
     return 2;
   }
   try {
     using namespace benchmark;
+    if (controller_only) {
+      fmt::print("{}", report::markdown({"Speed and error", {controller_section()}}));
+      return 0;
+    }
     const report::Page page{
         "Speed and error",
-        {introduction(), integrator_section(pictures), scene_section(), velocity_section(pictures),
-         sine_section(pictures), square_root_section(pictures), field_section(pictures),
-         tick_section(pictures), image_section(budget)}};
+        {introduction(), integrator_section(pictures), controller_section(), scene_section(),
+         velocity_section(pictures), sine_section(pictures), square_root_section(pictures),
+         field_section(pictures), tick_section(pictures), image_section(budget)}};
     const std::string folder =
         pictures.has_filename() ? pictures.filename().string() : pictures.parent_path().filename().string();
     fmt::print("{}", with_folder(report::markdown(page), page, folder));

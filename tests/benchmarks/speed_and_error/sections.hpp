@@ -3,12 +3,24 @@
 // what is compared with what.
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "host_tools/report/page.hpp"
 
 namespace kmax::benchmark {
 
 report::Section integrator_section(const std::filesystem::path& pictures);
+/// With the controller, as far as a largest stiffness needs it.
+report::Section controller_section();
+/// RK4 against the exact method with shared matrices, 500 Hz, forces given: the fewest steps per tick with
+/// which it errs as little.
+struct EqualError {
+  std::string trial;
+  double steps = 0.0, factor = 0.0;  // the exact method is so much faster
+  bool reached = false;
+};
+std::vector<EqualError> rk4_at_equal_error();
 report::Section scene_section();
 report::Section velocity_section(const std::filesystem::path& pictures);
 report::Section sine_section(const std::filesystem::path& pictures);
