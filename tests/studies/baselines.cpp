@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/experiment/paper_numbers.hpp"
+#include "tests/studies/audit.hpp"
 #include "tests/studies/studies.hpp"
 
 namespace kmax::studies {
@@ -158,6 +159,8 @@ WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffne
     price.work += paid.work / people;
     price.field_at_rest += paid.field_at_rest / people;
     price.rate_hardness += paid.rate_hardness / people;
+    price.peak_force += paid.peak_force / people;
+    price.touch_work += paid.touch_work / people;
   }
   return price;
 }
@@ -172,8 +175,9 @@ std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vect
   const auto found = sweep(set, walls, protocols, run);
   std::vector<BaselineResult> results;
   for (std::size_t n = 0; n < laws.size(); ++n)
-    results.push_back(
-        {laws[n], found[0][n], found[2][n], found[1][n], price_of(set, laws[n].wall, priced_stiffness)});
+    results.push_back({laws[n], found[0][n], found[2][n], found[1][n],
+                       smaller_of_each(found[0][n], found[1][n]),
+                       price_of(set, laws[n].wall, priced_stiffness)});
   return results;
 }
 
@@ -181,22 +185,23 @@ namespace {
 
 report::Table baseline_table(std::string caption, const SubjectSet& set,
                              const std::vector<BaselineResult>& results, experiment::MarkedMeans& marks) {
-  report::Table table{
-      std::move(caption),
-      {"wall", "moves, N/mm", "moves, 4 phases, N/mm", "swings by 1 N, N/mm", "field at rest, N",
-       "work on the way in, mJ", "deepest, mm", "rate-hardness, N/mm", "rated by people"},
-      {}};
+  report::Table table{std::move(caption),
+                      {"wall", "moves, N/mm", "moves, 4 phases, N/mm", "swings by 1 N, N/mm", "both, N/mm",
+                       "field at rest, N", "work on the way in, mJ", "work over the touch, mJ",
+                       "peak force, N", "deepest, mm", "rate-hardness, N/mm", "rated by people"},
+                      {}};
   for (const BaselineResult& result : results) {
     const auto cell = [&](const PeopleMean& found, const char* which) {
       return marks.cell(found.mean, found.ends, set.subjects.size(),
                         fmt::format("{}, {}", result.law.name, which));
     };
-    table.rows.push_back({result.law.name, cell(result.moves, "moves"), cell(result.phases, "4 phases"),
-                          cell(result.feels, "swings"), fmt::format("{:.2f}", result.price.field_at_rest),
-                          fmt::format("{:.2f}", result.price.work * 1e3),
-                          fmt::format("{:.2f}", result.price.depth * 1e3),
-                          n_per_mm(result.price.rate_hardness),
-                          result.law.paper ? fmt::format("{:g}", result.law.paper->transparency) : "-"});
+    table.rows.push_back(
+        {result.law.name, cell(result.moves, "moves"), cell(result.phases, "4 phases"),
+         cell(result.feels, "swings"), cell(result.both, "both"),
+         fmt::format("{:.2f}", result.price.field_at_rest), fmt::format("{:.2f}", result.price.work * 1e3),
+         fmt::format("{:.2f}", result.price.touch_work * 1e3), fmt::format("{:.2f}", result.price.peak_force),
+         fmt::format("{:.2f}", result.price.depth * 1e3), n_per_mm(result.price.rate_hardness),
+         result.law.paper ? fmt::format("{:g}", result.law.paper->transparency) : "-"});
   }
   return table;
 }
@@ -264,14 +269,26 @@ report::Section baseline_section(const SubjectSet& set, const std::vector<Baseli
       fmt::format(
           "A wall counts as unstable when the handle moves by more than 0.165 mm, or when its force swings "
           "by more than {:g} N. With 4 phases every touch is made four times, meeting the surface at other "
-          "times within a sample. Costs are of one touch of {} N/mm at {:g} m/s.",
-          felt_force, n_per_mm(priced_stiffness), priced_speed),
+          "times within a sample. 'Both' is the mean of what each of the people can have by the one of "
+          "position "
+          "and force that gives it less. Costs are of one touch of {} N/mm at {:g} m/s. {:g} N is our own "
+          "choice, "
+          "taken from no study: three tenths of what the papers' device can push with. Fingers feel far "
+          "smaller "
+          "vibrations, so what passes may still be felt.",
+          felt_force, n_per_mm(priced_stiffness), priced_speed, felt_force),
+      fmt::format(
+          "Peak force is the most that wall and field push with until the end of the hold; the work over the "
+          "touch is what the hand has put in against them by then: stored in the spring, or taken by a "
+          "damper. Below 0 an oscillating wall has given more than it took; the plain wall allows {} N/mm.",
+          n_per_mm(results.front().moves.mean)),
       fmt::format(
           "Damping of 8 N s/m without any field allows {} N/mm, the paper's 2 N field {}; by the force that "
           "swings {} and {}.",
           n_per_mm(damper.moves.mean), n_per_mm(field.moves.mean), n_per_mm(damper.feels.mean),
           n_per_mm(field.feels.mean)),
-      front_words(results), rating_words(results),
+      front_words(results),
+      rating_words(results),
       "The passivity controller (Hannaford and Ryu 2002) damps with at most alpha once the wall has given "
       "more energy than it took; against the spring's energy, once it has given more than the spring would "
       "hold. It is not in the firmware."};
@@ -324,14 +341,16 @@ plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult
   figure.legend_beside = true;
   for (const Price& price : {Price{"deepest (mm)", &WallPrice::depth, 1e3},
                              Price{"rate-hardness (N/mm)", &WallPrice::rate_hardness, 1e-3},
-                             Price{"field at rest (N)", &WallPrice::field_at_rest, 1.0}}) {
+                             Price{"field at rest (N)", &WallPrice::field_at_rest, 1.0},
+                             Price{"peak force (N)", &WallPrice::peak_force, 1.0},
+                             Price{"work over the touch (mJ)", &WallPrice::touch_work, 1e3}}) {
     plot::Panel panel{price.label, {}, {}};
     std::string_view family;
     for (const BaselineResult& result : results) {
       if (result.law.family != family || panel.series.empty())
         panel.series.push_back({figure.panels.empty() ? result.law.family : "", {}, {}, false, true});
       family = result.law.family;
-      panel.series.back().x.push_back(std::min(result.moves.mean, result.feels.mean) / 1e3);
+      panel.series.back().x.push_back(result.both.mean / 1e3);
       panel.series.back().y.push_back(result.price.*price.value * price.scale);
     }
     figure.panels.push_back(std::move(panel));
@@ -339,10 +358,26 @@ plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult
   return figure;
 }
 
+namespace {
+
+void keep(const StudyInput& input, std::string_view study, const SubjectSet& set,
+          const std::vector<BaselineResult>& results) {
+  for (const BaselineResult& result : results) {
+    input.keep(study, set, result.law.name, "position", result.moves);
+    input.keep(study, set, result.law.name, "position, 4 phases", result.phases);
+    input.keep(study, set, result.law.name, "force", result.feels);
+  }
+}
+
+}  // namespace
+
 std::vector<report::Section> baselines(const StudyInput& input) {
   std::vector<report::Section> sections;
+  std::vector<std::pair<const SubjectSet*, std::vector<BaselineResult>>> of_sets;
   for (const SubjectSet& set : input.sets) {
-    const std::vector<BaselineResult> results = run_baselines(set, law_baselines(), input.run);
+    of_sets.emplace_back(&set, run_baselines(set, law_baselines(), input.run));
+    const std::vector<BaselineResult>& results = of_sets.back().second;
+    keep(input, "baselines", set, results);
     sections.push_back(baseline_section(set, results));
     if (!input.folder.empty()) {
       const std::filesystem::path file =
@@ -355,8 +390,24 @@ std::vector<report::Section> baselines(const StudyInput& input) {
                                        "field is better.",
                                    file}};
     }
-    sections.push_back(relation_section(set, run_baselines(set, relation_baselines(), input.run)));
+    const std::vector<BaselineResult> relations = run_baselines(set, relation_baselines(), input.run);
+    keep(input, "relations", set, relations);
+    sections.push_back(relation_section(set, relations));
   }
+  const auto with_limit = [&](bool limited) {
+    return std::ranges::find_if(
+        of_sets, [&](const auto& of) { return limited == (of.first->device.force_limit > 0.0); });
+  };
+  const auto clipped = with_limit(true), unclipped = with_limit(false);
+  if (clipped == of_sets.end() || unclipped == of_sets.end()) return sections;
+  const AuditComparison comparison =
+      compare_with_audit(*clipped->first, clipped->second, unclipped->second, input.run);
+  for (const ReadResult& one : comparison.readings) {
+    const std::string wall = fmt::format("{}; {}", one.reading.law, one.reading.what);
+    input.keep("audit", *clipped->first, wall, "position", one.moves);
+    input.keep("audit", *clipped->first, wall, "force", one.feels);
+  }
+  sections.push_back(audit_section(comparison));
   return sections;
 }
 

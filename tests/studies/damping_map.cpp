@@ -154,6 +154,19 @@ std::vector<report::Section> damping_map(const StudyInput& input) {
   run.protocol.pushes.assign(map_pushes.begin(), map_pushes.end());
   const SubjectSet& set = input.sets.front();
   const std::vector<DampingMap> maps = run_damping_map(set, loop_settings(), run);
+  for (const DampingMap& map : maps) {
+    const auto keep = [&](const std::string& wall, const TwoMeans& found) {
+      const std::string name = fmt::format("{}; {}", wall, map.setting.name);
+      input.keep("damping", set, name, "position", found.moves);
+      input.keep("damping", set, name, "force", found.feels);
+    };
+    const std::array laws{plain_wall(), field_of_two(), adaptive_as_printed()};
+    for (std::size_t n = 0; n < laws.size(); ++n) keep(laws[n].name, map.laws[n]);
+    for (std::size_t n = 0; n < all_estimators.size(); ++n)
+      for (std::size_t at = 0; at < map_dampings.size(); ++at)
+        keep(fmt::format("damping {:g} N s/m, {}", map_dampings[at], estimator_name(all_estimators[n])),
+             map.damped[n][at]);
+  }
   report::Section section = damping_section(set, maps);
   if (!input.folder.empty())
     section.pictures = {draw_damping_map(maps.front(), input.folder / "stiffness_against_damping.svg")};

@@ -236,7 +236,14 @@ std::vector<report::Section> growing_walls(const StudyInput& input) {
   StiffnessRun drawn_run = run;
   drawn_run.protocol.approach_speeds = {0.1, 0.5, 1.0};
   drawn_run.protocol.pushes = {0.3, 1.0};
-  return {growing_section(set, run_growing_walls(set, run)),
+  const std::vector<GrowingResult> walls = run_growing_walls(set, run);
+  for (const GrowingResult& wall : walls)
+    for (std::size_t n = 0; n < wall.situations.size(); ++n) {
+      const std::string name = fmt::format("{}; {}", wall.wall, growing_situations()[n].name);
+      input.keep("growing", set, name, "position", wall.situations[n].moves);
+      input.keep("growing", set, name, "force", wall.situations[n].feels);
+    }
+  return {growing_section(set, walls),
           drawn_section(run_drawn_devices(set, draw_devices(set, drawn_count, drawn_seed), {}, drawn_run))};
 }
 

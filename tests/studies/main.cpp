@@ -1,6 +1,6 @@
-// kmax-studies: makes docs/experiments/max_stiffness.md, the study of the largest stiffness (as `kmax
-// experiment max-stiffness`) and behind it the studies that are named; and what other pages rest on, each by
-// a command of its own.
+// kmax-studies: makes docs/experiments/max_stiffness.md of the studies that are named, among them that of the
+// largest stiffness (as `kmax experiment max-stiffness`), and beside it what each of the people can have, as
+// CSV; and what other pages rest on, each by a command of its own.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -20,20 +20,6 @@
 
 namespace kmax::studies {
 namespace {
-
-report::Page make_page(const StudyInput& input, const std::vector<std::string>& names) {
-  std::vector<experiment::MaxStiffnessStudy> studies;
-  for (const SubjectSet& set : input.sets)
-    studies.push_back(
-        experiment::run_max_stiffness_study(set, experiment::stiffness_conditions(), input.run));
-  if (input.done) input.done("largest stiffness");
-  report::Page page{"Largest stable stiffness", {experiment::max_stiffness_section(studies)}};
-  if (!input.folder.empty())
-    page.sections.front().pictures.push_back(
-        experiment::draw_max_stiffness(studies, input.folder / "max_stiffness.svg"));
-  for (report::Section& section : run_studies(names, input)) page.sections.push_back(std::move(section));
-  return page;
-}
 
 void add_instability(CLI::App& studies) {
   CLI::App* app = studies.add_subcommand(
@@ -67,15 +53,20 @@ void add_wall_design(CLI::App& studies) {
       "wall-design", "Walls of 'kmax design wall' against a fine grid, on random devices, as CSV.");
   struct Options {
     std::uint64_t first = 1, devices = 10;
+    bool same_lattice = false;
     experiment::DesignRun run;
   };
   const auto options = std::make_shared<Options>();
   app->add_option("--first", options->first, "Seed of the first device")->capture_default_str();
   app->add_option("--devices", options->devices, "How many")->capture_default_str();
+  app->add_flag(
+      "--same-lattice", options->same_lattice,
+      "A grid of the walls that the design looks at too, instead of those half a step between them");
   app->add_option("--jobs", options->run.threads, "Searches at a time; all processors without it");
   app->callback([options] {
     const auto say = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
-    fmt::print("{}", report::csv(compare_designs(options->first, options->devices, options->run, say)));
+    fmt::print("{}", report::csv(compare_designs(options->first, options->devices, !options->same_lattice,
+                                                 options->run, say)));
   });
 }
 
@@ -107,11 +98,13 @@ int run(int count, char** arguments) {
   CLI::App app(help + "  all          all of them: more than half an hour on two cores");
   std::vector<std::string> names, sets{"clipped", "unclipped"};
   StudyInput input;
-  app.add_option("STUDY", names, "Names of studies; none: the study of the largest stiffness alone");
+  app.add_option("STUDY", names, "Names of studies, in the order of the page; none: 'largest'");
   app.add_option("--subjects", sets, "People and device: TOML files, 'clipped' or 'unclipped'")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_option("--out", input.folder, "Folder for the page and its pictures")->type_name("DIR");
+  app.add_option("--out", input.folder,
+                 "Folder for the page, its pictures and raw_STUDY.csv, a row for each person and wall")
+      ->type_name("DIR");
   experiment::Provenance provenance;
   app.add_option("--date", provenance.date, "Date that the page names")->type_name("YYYY-MM-DD");
   app.add_option("--program", provenance.program, "Program, with its commit, that the page names")
@@ -134,7 +127,10 @@ int run(int count, char** arguments) {
     fmt::print(stderr, "\r{}: {:.0f} s\n", study, std::chrono::duration<double>(now - begun).count());
     begun = now;
   };
-  report::Page page = make_page(input, names);
+  RawData raw;
+  input.raw = &raw;
+  report::Page page{"Largest stable stiffness",
+                    run_studies(names.empty() ? std::vector<std::string>{"largest"} : names, input)};
   fmt::print(stderr, "\n");
   for (const report::Section& section : page.sections) {
     fmt::print("{}\n", section.heading);
@@ -142,8 +138,16 @@ int run(int count, char** arguments) {
     for (const report::Table& table : section.tables) fmt::print("\n{}", report::terminal_text(table));
   }
   if (!input.folder.empty()) {
-    if (!provenance.date.empty()) page.sections.push_back(experiment::provenance_section(provenance));
+    if (!provenance.date.empty()) {
+      page.sections.push_back(experiment::provenance_section(provenance));
+      page.sections.back().paragraphs.insert(page.sections.back().paragraphs.begin() + 1,
+                                             "What each of the people can have under each wall, by each "
+                                             "criterion, lies behind these means: 'scripts/experiments "
+                                             "--raw DIR max-stiffness' keeps it in DIR as raw_STUDY.csv. It "
+                                             "is too large to lie beside this page.");
+    }
     report::write_page(page, input.folder, "max_stiffness");
+    raw.write(input.folder);
   }
   return 0;
 }

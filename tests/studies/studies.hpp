@@ -10,6 +10,7 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "host_tools/experiment/touch_price.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
+#include "tests/studies/raw_data.hpp"
 
 namespace kmax::studies {
 
@@ -34,11 +36,22 @@ using experiment::SubjectSet;
 using experiment::TouchProtocol;
 using experiment::TouchSetup;
 
+/// The largest stable stiffness of one wall over the people of a set.
+struct PeopleMean {
+  double mean = 0.0;                   ///< N/m
+  CountedEnds ends{};                  ///< of the people
+  double saturated_share = 0.0;        ///< largest, simulated_touch.hpp
+  std::vector<MaxStiffness> people{};  ///< in the order of the set
+};
+
 struct StudyInput {
   std::vector<SubjectSet> sets;  ///< calibrated, at least one
   StiffnessRun run;
   std::filesystem::path folder;                        ///< of pictures; empty: none are drawn
   std::function<void(std::string_view study)> done{};  ///< hears of each study when it has been made
+  RawData* raw = nullptr;                              ///< hears of each of the people
+  void keep(std::string_view study, const SubjectSet& set, std::string_view wall, std::string_view criterion,
+            const PeopleMean& found) const;
 };
 
 struct Study {
@@ -46,6 +59,8 @@ struct Study {
   std::vector<report::Section> (*run)(const StudyInput& input);
 };
 
+/// Figs. 6 and 8: as `kmax experiment max-stiffness` has it.
+std::vector<report::Section> largest(const StudyInput& input);
 std::vector<report::Section> held_walls(const StudyInput& input);
 std::vector<report::Section> causes(const StudyInput& input);
 std::vector<report::Section> assumptions(const StudyInput& input);
@@ -57,8 +72,12 @@ std::vector<report::Section> damping_map(const StudyInput& input);
 std::vector<report::Section> growing_walls(const StudyInput& input);
 std::vector<report::Section> loop_rates(const StudyInput& input);
 
-/// In the order of the page.
-inline constexpr std::array<Study, 10> all_studies{{
+/// In the order of the page: the strongest result first.
+inline constexpr std::array<Study, 11> all_studies{{
+    {"rates",
+     "500 Hz to 20 kHz, two encoders, delays and velocity estimators; the first set's device is used",
+     loop_rates},
+    {"largest", "the largest stable stiffness of each person under each law (Figs. 6 and 8)", largest},
     {"figures", "a wall of 5.5 N/mm held under each law (Figs. 9 to 12), V of eq. 7 as printed and rescaled",
      held_walls},
     {"causes", "the four causes of the gain at 2 N, one by one", causes},
@@ -75,9 +94,6 @@ inline constexpr std::array<Study, 10> all_studies{{
      damping_map},
     {"growing", "walls that grow stiff while the contact is calm, on 12 people and 200 drawn devices",
      growing_walls},
-    {"rates",
-     "500 Hz to 20 kHz, two encoders, delays and velocity estimators; the first set's device is used",
-     loop_rates},
 }};
 
 /// The named ones, all of them for "all". Throws std::invalid_argument for an unknown name and for no people.
@@ -93,12 +109,9 @@ inline constexpr std::array all_estimators{
 
 // --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
 
-/// The largest stable stiffness of one wall over the people of a set.
-struct PeopleMean {
-  double mean = 0.0;             ///< N/m
-  CountedEnds ends{};            ///< of the people
-  double saturated_share = 0.0;  ///< largest, simulated_touch.hpp
-};
+PeopleMean mean_of(std::span<const MaxStiffness> people);
+/// Of what each of the people can have by the one of two criteria that gives it less.
+PeopleMean smaller_of_each(const PeopleMean& one, const PeopleMean& other);
 
 /// What makes a wall of the touch that everybody begins with.
 using WallChange = std::function<void(TouchSetup&)>;
@@ -301,6 +314,7 @@ WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffne
 struct BaselineResult {
   Baseline law;
   PeopleMean moves, phases, feels;  ///< by the position, the same with four phases, by the force
+  PeopleMean both;                  ///< of each of the people the smaller by position and force
   WallPrice price;
 };
 std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vector<Baseline>& laws,

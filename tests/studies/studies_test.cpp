@@ -533,4 +533,25 @@ TEST(RateSection, HasATableForEachEncoderAndMeasureAndGapsWhereNothingWasRun) {
   EXPECT_EQ(folder.read("r.svg").find(fine.setting.name()), std::string::npos);
 }
 
+TEST(RateSection, BeginsWithWhatTheHighestRateHolds) {
+  EXPECT_EQ(all_studies.front().name, "rates") << "the page begins with its strongest result";
+  std::vector<RateResult> results;
+  for (const double rate : {500.0, 20e3})
+    for (const double damping : {0.0, 2.0})
+      results.push_back({{.rate = rate, .count_length = 5.5e-6, .wall_damping = damping},
+                         found_stiffness(rate < 1e3 ? 6000.0 : 200e3),
+                         found_stiffness(rate < 1e3      ? 7000.0
+                                         : damping > 0.0 ? 14e3
+                                                         : 180e3)});
+  results.push_back(results.back());  // with delay nothing is counted
+  results.back().setting.delay = 0.5e-3;
+  const std::string first = rate_section(results).paragraphs.front();
+  EXPECT_EQ(
+      first,
+      "With 5.5 um 2 of 2 walls without delay hold 15 N/mm at 20 kHz by the position and 1 by both criteria, "
+      "the stiffest of them 180 N/mm; at 500 Hz none does, the stiffest 6.");
+  results[1].moves = results[1].feels = found_stiffness(16e3);
+  EXPECT_CONTAINS(rate_section(results).paragraphs.front(), "at 500 Hz 1, the stiffest 16.");
+}
+
 }  // namespace kmax::studies::studies_test

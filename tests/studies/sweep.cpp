@@ -49,14 +49,43 @@ std::vector<TouchSetup> setups_of(const SubjectSet& set, const std::vector<WallC
   return setups;
 }
 
+}  // namespace
+
 PeopleMean mean_of(std::span<const MaxStiffness> people) {
-  PeopleMean mean{experiment::mean_stiffness(people), experiment::counted_ends(people), 0.0};
+  PeopleMean mean{experiment::mean_stiffness(people),
+                  experiment::counted_ends(people),
+                  0.0,
+                  {people.begin(), people.end()}};
   for (const MaxStiffness& person : people)
     mean.saturated_share = std::max(mean.saturated_share, person.saturated_share);
   return mean;
 }
 
-}  // namespace
+PeopleMean smaller_of_each(const PeopleMean& one, const PeopleMean& other) {
+  std::vector<MaxStiffness> smaller;
+  for (std::size_t n = 0; n < one.people.size(); ++n)
+    smaller.push_back(other.people[n].stiffness < one.people[n].stiffness ? other.people[n] : one.people[n]);
+  return mean_of(smaller);
+}
+
+void StudyInput::keep(std::string_view study, const SubjectSet& set, std::string_view wall,
+                      std::string_view criterion, const PeopleMean& found) const {
+  if (raw != nullptr) raw->add(study, set, wall, criterion, found.people);
+}
+
+std::vector<report::Section> largest(const StudyInput& input) {
+  std::vector<experiment::MaxStiffnessStudy> studies;
+  for (const SubjectSet& set : input.sets) {
+    studies.push_back(
+        experiment::run_max_stiffness_study(set, experiment::stiffness_conditions(), input.run));
+    for (const experiment::ConditionResult& result : studies.back().conditions)
+      input.keep("largest", set, result.condition.name, "position", mean_of(result.subjects));
+  }
+  report::Section section = experiment::max_stiffness_section(studies);
+  if (!input.folder.empty())
+    section.pictures.push_back(experiment::draw_max_stiffness(studies, input.folder / "max_stiffness.svg"));
+  return {section};
+}
 
 std::vector<std::vector<PeopleMean>> sweep(const SubjectSet& set, const std::vector<WallChange>& walls,
                                            const std::vector<TouchProtocol>& protocols,
@@ -73,17 +102,10 @@ std::vector<std::vector<PeopleMean>> sweep(const SubjectSet& set, const std::vec
 
 std::vector<TwoMeans> sweep_by_both(const SubjectSet& set, const std::vector<WallChange>& walls,
                                     const StiffnessRun& run) {
-  const auto found = search_by_each(setups_of(set, walls), by_both(run), run);
-  std::vector<MaxStiffness> smaller;
-  for (std::size_t n = 0; n < found[0].size(); ++n)
-    smaller.push_back(found[1][n].stiffness < found[0][n].stiffness ? found[1][n] : found[0][n]);
+  const auto found = sweep(set, walls, by_both(run), run);
   std::vector<TwoMeans> means;
-  for (std::size_t wall = 0; wall < walls.size(); ++wall) {
-    const auto mean = [&](const std::vector<MaxStiffness>& one) {
-      return mean_of(std::span(one).subspan(wall * set.subjects.size(), set.subjects.size()));
-    };
-    means.push_back({mean(found[0]), mean(found[1]), mean(smaller)});
-  }
+  for (std::size_t wall = 0; wall < walls.size(); ++wall)
+    means.push_back({found[0][wall], found[1][wall], smaller_of_each(found[0][wall], found[1][wall])});
   return means;
 }
 

@@ -26,7 +26,7 @@ GridOptimum optimum_of(const DesignTask& task, const WallGrid& grid, const WallF
   GridOptimum best{floor};
   bool found = false;
   const auto holds = [&](double damping, int rung) {
-    return !trials.first_unstable({family, damping, experiment::stiffness_of(rung)}, touches);
+    return !trials.first_unstable({family, damping, grid.stiffness(rung)}, touches);
   };
   for (const double damping : grid.dampings) {
     const int steps = best.rung < grid.first ? 0 : (best.rung - grid.first) / grid.step + 1;
@@ -48,12 +48,18 @@ GridOptimum optimum_of(const DesignTask& task, const WallGrid& grid, const WallF
 
 }  // namespace
 
-WallGrid fine_grid(const DesignTask& task) {
+double WallGrid::stiffness(int rung) const {
+  return experiment::stiffness_of(rung) * (between ? std::sqrt(experiment::rung_ratio) : 1.0);
+}
+
+WallGrid fine_grid(const DesignTask& task, bool between) {
   const std::vector<double> coarse = experiment::dampings_of(task);
   WallGrid grid{{0.0}};
+  grid.between = between;
   for (std::size_t n = 1; n < coarse.size(); ++n)
     for (int part = 0; part < 8; ++part)
-      grid.dampings.push_back(coarse[n] * std::pow(experiment::damping_ratio, (part - 7) / 8.0));
+      grid.dampings.push_back(coarse[n] *
+                              std::pow(experiment::damping_ratio, (part - (between ? 7.5 : 7.0)) / 8.0));
   return grid;
 }
 
@@ -96,7 +102,8 @@ DesignTask random_device(std::uint64_t seed) {
   return task;
 }
 
-report::Table compare_designs(std::uint64_t first, std::uint64_t devices, const experiment::DesignRun& run,
+report::Table compare_designs(std::uint64_t first, std::uint64_t devices, bool between,
+                              const experiment::DesignRun& run,
                               const std::function<void(const std::string&)>& say) {
   // How far below the design the grid is looked at.
   constexpr int below = 5;
@@ -112,9 +119,9 @@ report::Table compare_designs(std::uint64_t first, std::uint64_t devices, const 
                          ? static_cast<int>(std::lround(std::log(design.largest / experiment::first_rung) /
                                                         std::log(experiment::rung_ratio)))
                          : -1;
-    const GridOptimum grid = grid_optimum(task, fine_grid(task), rung - below, run);
-    const double best =
-        grid.rung < 0 ? experiment::stiffness_of(rung - below) : experiment::stiffness_of(grid.rung);
+    const WallGrid looked_at = fine_grid(task, between);
+    const GridOptimum grid = grid_optimum(task, looked_at, rung - below, run);
+    const double best = looked_at.stiffness(grid.rung < 0 ? rung - below : grid.rung);
     table.rows.push_back({std::to_string(seed), fmt::format("{:.3f}", device.mass),
                           fmt::format("{:.2f}", device.friction), fmt::format("{:.2f}", device.delay * 1e3),
                           device.structure ? in_n_per_mm(device.structure->stiffness) : "-",

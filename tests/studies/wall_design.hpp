@@ -13,11 +13,15 @@
 namespace kmax::studies {
 
 struct WallGrid {
-  std::vector<double> dampings;  ///< N s/m
-  int first = 162, step = 2;     ///< rungs: from 100 N/m on, 2 % apart
+  std::vector<double> dampings;      ///< N s/m
+  int first = 162, step = 2;         ///< rungs: from 100 N/m on, 2 % apart
+  bool between = false;              ///< stiffnesses half a rung higher, which a design never looks at
+  double stiffness(int rung) const;  ///< N/m
 };
-/// 0 and 192 more, 4.4 % apart, over the range that a design looks at.
-WallGrid fine_grid(const experiment::DesignTask& task);
+/// 0 and 192 more, 4.4 % apart, over the range that a design looks at: the dampings and stiffnesses that a
+/// search looks at too, or those half a step `between` them, which it does not, so that it cannot have found
+/// its best by looking where the grid does.
+WallGrid fine_grid(const experiment::DesignTask& task, bool between);
 
 struct GridOptimum {
   int rung = -1;  ///< -1: none above the floor
@@ -37,9 +41,10 @@ GridOptimum grid_optimum(const experiment::DesignTask& task, const WallGrid& gri
 /// The same device and loop on every machine.
 experiment::DesignTask random_device(std::uint64_t seed);
 
-/// A row for each device of the seeds from `first` on: the design beside the grid's best. `say` hears a line
-/// as soon as a device is done.
-report::Table compare_designs(std::uint64_t first, std::uint64_t devices, const experiment::DesignRun& run,
+/// A row for each device of the seeds from `first` on: the design beside the best of the fine grid. `say`
+/// hears a line as soon as a device is done.
+report::Table compare_designs(std::uint64_t first, std::uint64_t devices, bool between,
+                              const experiment::DesignRun& run,
                               const std::function<void(const std::string&)>& say);
 
 }  // namespace kmax::studies
