@@ -126,7 +126,8 @@ report::Section controller_section() {
       "eight walls, 15 touches at every stiffness in steps of 0.1 N/mm, 500 Hz), every touch with the "
       "firmware's "
       "haptic loop and its judge, once with the exact method and its shared matrices and once with RK4. "
-      "Speed: simulated seconds per second of processor time; of the exact method the best of 3.",
+      "Speed: simulated seconds per second of processor time; of the exact method the best of 3. "
+      "'speed_and_error_benchmark --controller' measures this section alone.",
       "Against: the exact method's own result. A largest stiffness is wanted to 0.1 N/mm, one step of the "
       "search, "
       "of the means of the people or of each of them: a wall that is held just so is decided by single "
