@@ -232,7 +232,7 @@ std::string explanation(const AuditRow& row, const std::vector<ReadResult>& read
   return fmt::format("{}: {}, {} N/mm",
                      gives(*nearest, row.law)
                          ? "read differently"
-                         : fmt::format("not explained by {} readings; the nearest", tried),
+                         : fmt::format("not explained; readings tried: {}, the nearest", tried),
                      nearest->reading.what, n_per_mm(nearest->moves.mean));
 }
 

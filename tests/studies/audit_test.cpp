@@ -132,7 +132,7 @@ TEST(AuditSection, SaysWhatExplainsADifferenceAndWhatDoesNot) {
   EXPECT_EQ(laws.rows[0], (Row{"plain", "3.57", "3.58", "+0.01", "3.57", "3.57", "+0.00", "3.48", "3.50",
                                "+0.02", "within the noise: 3.55 to 3.60 when touches begin elsewhere"}));
   EXPECT_EQ(laws.rows[1].back(), "read differently: never pulls, 6.00 N/mm");
-  EXPECT_EQ(laws.rows[2].back(), "not explained by 1 readings; the nearest: keeps, 13.00 N/mm");
+  EXPECT_EQ(laws.rows[2].back(), "not explained; readings tried: 1, the nearest: keeps, 13.00 N/mm");
   EXPECT_CONTAINS(laws.rows[3].back(), "within the noise");
   EXPECT_CONTAINS(laws.rows[4].back(), "not explained: 8.90 to 9.10");
   EXPECT_EQ(section.tables[1].rows[1], (Row{"passivity controller, alpha <= 15 N s/m", "never pulls", "6.00",
