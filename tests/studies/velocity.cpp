@@ -231,7 +231,8 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
              "and "
              "less error or the same, to a tenth, in {} of {} cases; slow motions at high rates gain most. "
              "Single samples of impacts are further off. A damped wall may be as stiff or stiffer at 2 kHz "
-             "and above, and up to a seventh less stiff at 500 Hz and 55 um (last table). It is not in the "
+             "and above, and up to a seventh less stiff in three of four cases at 500 Hz (last table). "
+             "It is not in the "
              "image: it still needs a start at a given velocity, for a change of estimator or resolution in "
              "flight; FOAW stays the reference.",
              worst_of(4), worst_of(0), as_good, cases.size())},
