@@ -7,9 +7,11 @@
 
 namespace kmax::board::odrive_v3 {
 
+inline constexpr std::uint32_t core_clock_hz = 168'000'000;  // timers 1 and 8 as well
+
 inline constexpr drivers::stm32f4::ThreePhasePwmConfig pwm_config{
     .half_period_ticks = 4200,
-    .dead_time_code = drivers::stm32f4::dead_time_code_for(168'000'000, 120),  // 21 ticks = 125 ns
+    .dead_time_code = drivers::stm32f4::dead_time_code_for(core_clock_hz, 120),  // 21 ticks = 125 ns
     .minimum_low_ticks = 252,
 };
 inline constexpr drivers::stm32f4::CurrentSamplingConfig sampling_config{
@@ -23,8 +25,8 @@ inline constexpr drivers::stm32f4::CurrentSamplingConfig sampling_config{
 /// Of both variants, whose dividers and ratings differ (voltage_variant.hpp).
 inline constexpr BoardDescription description{
     .name = "odrive_v3",
-    .core_clock_hz = 168'000'000,
-    .timer_clock_hz = 168'000'000,
+    .core_clock_hz = core_clock_hz,
+    .timer_clock_hz = core_clock_hz,
     .half_period_ticks = pwm_config.half_period_ticks,
     .dead_time_ticks = drivers::stm32f4::dead_time_ticks(pwm_config.dead_time_code),
     .minimum_low_ticks = pwm_config.minimum_low_ticks,

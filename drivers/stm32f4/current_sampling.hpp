@@ -165,7 +165,7 @@ class CurrentSampling {
     sample.valid = (flags_since & started_or_ended) == 0 && converted_axis == axis &&
                    (phase_c_flags & adc_sr::InjectedEnd::mask) != 0;
     if (!sample.valid) [[unlikely]]
-      count_fault(axis, converted_axis, phase_c_flags, flags_since);
+      reject(axis, converted_axis, phase_c_flags, flags_since);
     last_axis_ = axis;
     sample.slow_age = read_slow();
     sample.supply = supply_;
@@ -242,10 +242,10 @@ class CurrentSampling {
     axis_in_force_ = axis;
   }
 
-  /// Why a sample is not valid. Two triggers of one axis in a row are a mismatch as well, since the lists
-  /// change at each read.
-  [[gnu::noinline, gnu::cold]] void count_fault(unsigned axis, unsigned converted_axis,
-                                                std::uint32_t phase_c_flags, std::uint32_t flags_since) {
+  /// Of a sample that is not valid: counts why, and what the next one is to be believed. Two triggers of one
+  /// axis in a row are a mismatch as well, since the lists change at each read.
+  [[gnu::noinline, gnu::cold]] void reject(unsigned axis, unsigned converted_axis,
+                                           std::uint32_t phase_c_flags, std::uint32_t flags_since) {
     const bool disturbed = (flags_since & started_or_ended) != 0;
     // That trigger may have come before or after its list was written: its sample belongs to nobody.
     if (disturbed) axis_in_force_ = none;

@@ -9,12 +9,12 @@
 
 // Centre-aligned complementary PWM for three half-bridges on TIM1 or TIM8. RM0090, Advanced-control timers.
 //
-// The counter runs 0, 1, ... ARR, ... 1, 0: a period is 2 * ARR ticks, 168 MHz / 8400 = 20 kHz by default.
+// The counter runs 0, 1, ... ARR, ... 1, 0: a period is 2 * ARR ticks, as 168 MHz / 8400 = 20 kHz.
 // PWM mode 2 turns the high side on while the counter is above CCR, which gives a duty of exactly (ARR - CCR)
 // / ARR and centres the low-side window, 2 * CCR ticks, on the underflow. The shunts lie below the low sides,
 // so the underflow is where currents are sampled. `minimum_low_ticks` keeps CCR from falling below the time
 // that recharges the bootstrap, and from the low side's command to a settled amplifier of the lowest gain; of
-// a higher one it is the caller who leaves more. Default 252 ticks = 1.5 us: greatest duty 0.94.
+// a higher one it is the caller who leaves more. 252 of 4200 ticks are 1.5 us: greatest duty 0.94.
 //
 // Registers are preloaded: a duty becomes active at the next over- or underflow (RCR = 0), at most half a
 // period later, all three legs together. Three stores are not one: a call that straddles that instant gives

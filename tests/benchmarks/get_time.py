@@ -25,6 +25,14 @@ def call(kmax, device):
     return (time.monotonic() - begin) * 1e3
 
 
+def wait_for(server, place):
+    end = time.monotonic() + 10
+    while not os.path.exists(place):
+        if server.poll() is not None or time.monotonic() > end:
+            sys.exit(f"get_time: kmax serve does not offer {place}")
+        time.sleep(0.05)
+
+
 def main(arguments):
     kmax = arguments[0] if arguments else "build/native/kmax"
     processor = next((line.split(": ")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
@@ -40,11 +48,11 @@ def main(arguments):
         for link, option in (("serial", "--serial"), ("can", "--can")):
             place = f"{folder}/{link}"
             with subprocess.Popen([kmax, "serve", option, place], stdout=subprocess.DEVNULL) as server:
-                while not os.path.exists(place):
-                    time.sleep(0.05)
-                time.sleep(0.5)
-                taken = [call(kmax, f"{link}:{place}") for _ in range(CALLS)]
-                server.terminate()
+                try:
+                    wait_for(server, place)
+                    taken = [call(kmax, f"{link}:{place}") for _ in range(CALLS)]
+                finally:
+                    server.terminate()
             good = statistics.median(taken) <= LIMIT_MS
             kept = kept and good
             print(f"| {link} | {min(taken):.1f} | {statistics.median(taken):.1f} | {max(taken):.1f} | "

@@ -23,6 +23,7 @@ inline const std::array<VelocityCandidate, 6> velocity_candidates{{
     {"edge period, 16", "alone: edge period, 16 samples "},
     {"edge period, 8", "alone: edge period, 8 samples "},
 }};
+constexpr std::size_t edge_period = 4;  ///< of 16 samples
 template <typename Number>
 using ByCandidate = std::array<Number, velocity_candidates.size()>;
 
@@ -36,6 +37,8 @@ struct VelocityCase {
 };
 /// Slow and fast motions, impacts and rest at an edge; three encoders; 500 Hz, 2 kHz, 20 kHz.
 std::vector<VelocityCase> measure_velocity_errors();
+
+std::vector<VelocityCase> at_rate(const std::vector<VelocityCase>& cases, double rate);
 
 /// RMS error over FOAW's: geometric mean over the cases, and the largest.
 struct AgainstFoaw {

@@ -134,7 +134,7 @@ report::Section controller_section() {
       "counts, so "
       "one person may be further off than the mean.",
       fmt::format(
-          "{} {} These are the honest ratios for this purpose. The ratio at equal error answers another "
+          "{} {} The ratio at equal error answers another "
           "question, what RK4 would need to be as exact as the exact method, which no largest stiffness "
           "asks for.",
           needed_words("the means", of_means), needed_words("everybody", of_people))};

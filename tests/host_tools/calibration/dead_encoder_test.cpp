@@ -48,9 +48,10 @@ TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
   const int whole = length_of(GetParam()).whole;
   const int points = in_a_soak() ? 9 : 4;
-  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation. 90 mm
-  // is the farthest that has been seen, where gimbal_b's encoder dies at about three quarters of the way.
-  const double farthest = 5.0 * settings.travel;
+  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation. 222 mm
+  // is the farthest that has been seen, where gimbal_b's encoder dies at about half of the way, just before
+  // the motor is taken for blocked; a few reports later it is a few mm.
+  const double farthest = 12.0 * settings.travel;
   for (int point = 1; point < points; ++point) {
     const int at = whole * point / points;
     const Course course = course_of(GetParam(), settings, at);
