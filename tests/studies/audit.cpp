@@ -362,8 +362,8 @@ report::Section audit_section(const AuditComparison& comparison) {
       "not at hand; its words are short, so a law may be meant in several ways.",
       fmt::format(
           "Of {} laws {} come out within the noise, which is measured: the range of four more studies whose "
-          "touches begin up to 1.1 mm further out, and 0.1 N/mm, a step of the search. Of the others {} are "
-          "explained by one reading that gives the audit's number within 4 %, and {} are not.",
+          "touches begin up to 1.1 mm further out, and 0.1 N/mm, a step of the search. Of the others {} can "
+          "be had within 4 % by another reading, the nearest for each law, and {} cannot.",
           comparison.rows.size(), within, explained, comparison.rows.size() - within - explained)};
   section.paragraphs.emplace_back(
       "The last column names the nearest of several readings, which shows that the audit's number can be had "
