@@ -104,7 +104,7 @@ void Bench::wait(double seconds) {
     const auto left = end - device_.link().now();
     if (left <= microseconds(0)) return;
     device_.link().wait(
-        std::min<microseconds>(left, longest_still_ > 0.0 ? next_look() : of_seconds(longest_silence_)));
+        std::min<microseconds>(left, still_watch_.active() ? next_look() : of_seconds(longest_silence_)));
     if (stands()) return;
     // Both a sign of life for the device and a look whether there is still a reason to wait.
     if (armed_ && drive_.status().faulty()) return;
@@ -194,11 +194,16 @@ void Bench::disarm() {
   if (!harmless || found.remains) unseen_trip_ = found;
 }
 
-void Bench::begin_still_watch(double longest_still) {
-  longest_still_ = longest_still;
-  if (longest_still <= 0.0) return;
-  still_count_ = number("measured.count");
-  still_since_ = device_.link().now();
+void Bench::brake() {
+  if (!armed_) return;
+  still_watch_ = {};
+  journal_.set_temporary(ExcitationPlan{.kind = "voltage"}.assignments());
+  wait(0.1);
+}
+
+void Bench::begin_still_watch(const StillLimits& limits) {
+  still_watch_ = {};
+  if (limits.any()) still_watch_ = {limits, number("measured.count"), device_.link().now()};
 }
 
 microseconds Bench::next_look() {
@@ -207,32 +212,25 @@ microseconds Bench::next_look() {
 }
 
 bool Bench::stands() {
-  constexpr double fewest_counts = 2.0, slowest = 0.002;  // m/s
-  if (longest_still_ <= 0.0 || !armed_) return false;
-  const double count = number("measured.count");
-  const auto now = device_.link().now();
-  if (std::abs(count - still_count_) >= fewest_counts || std::abs(number("measured.velocity")) > slowest) {
-    still_count_ = count;
-    still_since_ = now;
-  }
-  return now - still_since_ > of_seconds(longest_still_);
+  if (!still_watch_.active() || !armed_) return false;
+  const double count = number("measured.count"), velocity = number("measured.velocity");
+  return still_watch_.stands(count, velocity, device_.link().now());
 }
 
-void Bench::wait_until_finished(double longest_still) {
-  begin_still_watch(longest_still);
+void Bench::finish_and_brake(Waveforms& seen) {
   const auto end = device_.link().now() + of_seconds(longest_excitation);
   while (armed_ && number("measured.excitation_finished") == 0.0) {
     progress_("");
-    if (const auto tripped = trip()) {
-      if (tripped->fault == firmware::Fault::link_silent) return;
-      throw AxisTripped(*tripped);
-    }
-    if (stands()) return disarm();
+    seen.trip = trip();
+    if (seen.trip) return;
+    seen.stood = stands();
+    if (seen.stood) break;
     if (device_.link().now() >= end)
       throw device::DeviceError(
           fmt::format("axis {}: the excitation does not end; look at excitation.duration", drive_.axis()));
     device_.link().wait(next_look());
   }
+  brake();
 }
 
 void Bench::require_heard(const Trip& trip) const {
@@ -274,7 +272,7 @@ Waveforms Bench::record_heard(const ExcitationPlan& excitation, const CapturePla
 Waveforms Bench::record_once(const ExcitationPlan& excitation, const CapturePlan& plan, double reach,
                              Afterwards afterwards) {
   arm(reach);
-  begin_still_watch(plan.longest_still);
+  begin_still_watch(plan.still);
   device::CaptureReader reader(device_);
   const bool from_start = plan.delay <= 0.0;
   if (from_start) begin_capture(reader, plan, firmware::CaptureTrigger::excitation);
@@ -288,15 +286,15 @@ Waveforms Bench::record_once(const ExcitationPlan& excitation, const CapturePlan
     wait(plan.delay);
     begin_capture(reader, plan, firmware::CaptureTrigger::now);
   }
-  return finish_capture(reader, afterwards);
+  return finish_capture(reader, afterwards, plan.brake);
 }
 
 Waveforms Bench::watch(const CapturePlan& plan) {
   begin();
-  begin_still_watch(0.0);
+  begin_still_watch({});
   device::CaptureReader reader(device_);
   begin_capture(reader, plan, firmware::CaptureTrigger::now);
-  return finish_capture(reader, Afterwards::any);
+  return finish_capture(reader, Afterwards::any, false);
 }
 
 void Bench::begin_capture(device::CaptureReader& reader, const CapturePlan& plan,
@@ -309,7 +307,7 @@ void Bench::begin_capture(device::CaptureReader& reader, const CapturePlan& plan
               .trigger = trigger});
 }
 
-Waveforms Bench::finish_capture(device::CaptureReader& reader, Afterwards afterwards) {
+Waveforms Bench::finish_capture(device::CaptureReader& reader, Afterwards afterwards, bool brakes) {
   struct Ended {};
   Waveforms seen;
   try {
@@ -321,8 +319,12 @@ Waveforms Bench::finish_capture(device::CaptureReader& reader, Afterwards afterw
     });
   } catch (const Ended&) {
     reader.stop();
-    if (seen.stood) disarm();
+    if (seen.stood) {
+      brake();
+      disarm();
+    }
   }
+  if (brakes && !seen.trip) finish_and_brake(seen);
   if (afterwards == Afterwards::any && !seen.trip && armed_) seen.trip = trip();
   try {
     const device::Captured captured = reader.read([&](const device::CaptureProgress&) { progress_(""); });

@@ -99,10 +99,6 @@ class Bench {
   Waveforms record_alone(const ExcitationPlan& excitation, const CapturePlan& plan);
   /// Captures without arming.
   Waveforms watch(const CapturePlan& plan);
-  /// Until the excitation's duration is over, or the device has ended it because the host was silent. Throws
-  /// AxisTripped if the axis trips otherwise, DeviceError if the excitation does not end. `longest_still`: s;
-  /// an encoder that counts nothing for longer disarms the axis. 0: it may.
-  void wait_until_finished(double longest_still = 0.0);
 
   /// Zero volts; what is armed stays so. A power stage that is still starting is waited for, up to 2 s.
   /// HeldUp likewise.
@@ -112,6 +108,10 @@ class Bench {
   /// A fault that is found there is cleared if its cause is gone; arming after it throws AxisTripped with it,
   /// unless it is that of a handle that coasted out of its travel, or of a silent host.
   void disarm();
+  /// Shorts the winding, and waits for a tenth of a second until that has taken the speed of the handle,
+  /// whatever its encoder says. A handle of 0.1 kg with little friction, let go at 0.6 m/s, would coast for
+  /// 60 mm.
+  void brake();
   /// A fault whose cause stays, or a refusal to arm: nothing more can be measured.
   bool unusable() const { return unusable_; }
   /// A trip that disarm() found and nobody has taken yet.
@@ -143,8 +143,9 @@ class Bench {
   Trip cleared(const device::DriveStatus& status);
   void begin_capture(device::CaptureReader& reader, const CapturePlan& plan,
                      firmware::CaptureTrigger trigger);
-  Waveforms finish_capture(device::CaptureReader& reader, Afterwards afterwards);
-  void begin_still_watch(double longest_still);
+  Waveforms finish_capture(device::CaptureReader& reader, Afterwards afterwards, bool brakes);
+  void finish_and_brake(Waveforms& seen);
+  void begin_still_watch(const StillLimits& limits);
   std::chrono::microseconds next_look();
   bool stands();
 
@@ -162,9 +163,7 @@ class Bench {
   bool unusable_ = false;
 
   std::size_t looks_ = 0;
-  double longest_still_ = 0.0;  // s; 0: nobody wants to know
-  double still_count_ = 0.0;
-  std::chrono::microseconds still_since_{};
+  StillWatch still_watch_;
   std::optional<Trip> unseen_trip_;
 };
 

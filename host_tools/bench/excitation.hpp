@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/drive/fault.hpp"
+#include "host_tools/bench/still_watch.hpp"
 
 namespace kmax::bench {
 
@@ -36,10 +37,10 @@ struct ExcitationPlan {
 struct CapturePlan {
   std::vector<std::string> channels;  ///< names as in capture.channel_1, at most 4
   std::size_t samples = 1000;
-  int interval = 1;    ///< ticks
-  double delay = 0.0;  ///< s from the start of the excitation; 0: from its first tick
-  /// s; an encoder that counts nothing for longer ends the excitation and the capture. 0: it may.
-  double longest_still = 0.0;
+  int interval = 1;        ///< ticks
+  double delay = 0.0;      ///< s from the start of the excitation; 0: from its first tick
+  StillLimits still{};     ///< an encoder that counts nothing for longer ends the excitation and the capture
+  bool brake = false;      ///< Bench::brake() once the excitation is over, before the samples are read
   std::size_t before = 0;  ///< samples from before the first tick; with `delay` 0 only
 };
 
@@ -57,7 +58,7 @@ struct Waveforms {
   std::map<std::string, std::vector<double>> channels;
   std::size_t before = 0;    ///< samples before the first tick; fewer than asked for if it came soon
   std::optional<Trip> trip;  ///< then they may be short or empty
-  bool stood = false;        ///< ended because of CapturePlan::longest_still, likewise
+  bool stood = false;        ///< ended because of CapturePlan::still, likewise
 
   std::span<const double> of(const std::string& name) const { return channels.at(name); }
   std::size_t samples() const { return channels.empty() ? 0 : channels.begin()->second.size(); }

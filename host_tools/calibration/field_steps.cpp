@@ -99,8 +99,13 @@ void FieldSweep::prepare() {
   const Waveforms to = turn(half_turn, {"count", "voltage_d"}, 600);
   double after = bench_.displacement();
   const double counts = std::abs(after - before) / known_.count_length();
+  // An encoder that died on the way would make the way of a radian of the field too short, and what is turned
+  // by it far too long: a handle was led 217 mm away.
+  const auto count = to.of("count");
+  const double at_last = bench::span_of(count.last(count.size() / 3));
+  constexpr double steady = 0.3;  // of a third of the way: cogging holds the rotor back and lets it go
   // 64 pole pairs are the most there are.
-  if (counts < std::max(2.0, 0.3 * known_.counts_per_turn / 64.0 / 2.0)) {
+  if (counts < std::max(2.0, 0.3 * known_.counts_per_turn / 64.0 / 2.0) || at_last < steady * counts / 3.0) {
     const Waveforms fro = turn(-half_turn, {"count", "voltage_d"}, 600);
     diagnose_still(counts, to, fro);
   }
@@ -266,6 +271,7 @@ void find_field_angle(Calibration& run) {
   report.values.push_back(repeated_value("field.lag", lags, "rad", std::nullopt));
   settle_direction(run, fit.direction > 0, "the shaft turns against the field, as the encoder counts it");
   known.electrical_offset = offset.value;
+  known.commutation_found = true;
   // First forgotten: what the device then learns is tied to the values below.
   bench.set_result({"motor.commutation_known=no"});
   bench.set_result({fmt::format("motor.pole_pairs={}", fit.whole_pole_pairs),

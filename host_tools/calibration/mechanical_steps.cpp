@@ -154,10 +154,15 @@ void find_motion(Calibration& run) {
   Bench& bench = run.bench;
   MotorKnowledge& known = run.known;
   StepReport& report = run.report;
+  const double mass_before = known.mass;
   Shaking strong(bench, known, known.current, stroke_share * bench.travel());
   strong.prepare();
-  const double rough = fit_of(known, {&strong}, {strong.half_period()}).friction.value;
-  const double wanted = motion_force_ratio * std::max(rough, 0.0) / known.force_per_ampere();
+  const MotionFit rough = fit_of(known, {&strong}, {strong.half_period()});
+  // Not good enough to be kept, but it bounds how far the weaker waves can throw the handle if its encoder
+  // dies.
+  known.mass = rough.mass.value;
+  known.mass_known = true;
+  const double wanted = motion_force_ratio * std::max(rough.friction.value, 0.0) / known.force_per_ampere();
   std::vector<Estimate> mass, damping, friction;
   const auto shake_with = [&](double current) {
     Shaking gentle(bench, known, current, stroke_share * bench.travel());
@@ -183,7 +188,7 @@ void find_motion(Calibration& run) {
     }
     mass.clear(), damping.clear(), friction.clear();
   }
-  report.values.push_back(repeated_value("device.mass", mass, "kg", known.mass));
+  report.values.push_back(repeated_value("device.mass", mass, "kg", mass_before));
   report.values.push_back(repeated_value("friction", friction, "N", std::nullopt));
   report.values.push_back(repeated_value("damping", damping, "N s/m", std::nullopt));
   constexpr double fine_friction = 0.02;  // N, nothing that a hand feels
@@ -274,6 +279,12 @@ void map_compensation(Calibration& run) {
   }
   const double end = bench.displacement();
   sweep(bench, known, end, -end);
+  // Nothing is fitted to this last way, and nothing else would say that its encoder has died.
+  const double left = bench.displacement();
+  if (std::abs(left) > 0.25 * reach)
+    throw_standing(bench, known, false,
+                   fmt::format("led back by {:.1f} mm to the middle, the handle is {:.1f} mm away from it",
+                               1000.0 * std::abs(end), 1000.0 * std::abs(left)));
   std::vector<CoggingSweep> views;
   for (const RecordedSweep& one : sweeps) views.push_back({one.force, one.angle});
   CoggingFitConfig config;

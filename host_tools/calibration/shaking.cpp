@@ -17,40 +17,67 @@ bool InducedVoltage::sure(const MotorKnowledge& known, double current) const {
   return volts > std::max(share * known.resistance * std::abs(current), errors * error);
 }
 
+namespace {
+// Of one component of the voltage; the resistance takes its share along `current` alone. Rises and noise add
+// up over the components.
+struct Rises {
+  std::vector<double> squares;  // V^2 for each half wave
+  double noise_square = 0.0;    // V^2 of a sample
+};
+
+void add_component(Rises& rises, std::span<const double> voltage, std::span<const double> current,
+                   double resistance, std::size_t half_period, std::size_t first, std::size_t end) {
+  const auto mean_over = [&](std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t k = from; k < to; ++k) sum += voltage[k] - resistance * current[k];
+    return sum / static_cast<double>(to - from);
+  };
+  std::size_t wave = 0;
+  for (std::size_t begin = first; begin + half_period <= end; begin += half_period, ++wave) {
+    const double early = mean_over(begin + 3 * half_period / 10, begin + 6 * half_period / 10);
+    const double late = mean_over(begin + 7 * half_period / 10, begin + half_period);
+    // Their middles are four tenths of a half wave apart.
+    const double rise = (late - early) / 0.4;
+    if (wave == rises.squares.size()) rises.squares.push_back(0.0);
+    rises.squares[wave] += rise * rise;
+  }
+  std::vector<double> steps;
+  for (std::size_t k = first + 1; k < end; ++k)
+    if ((current[k] < 0.0) == (current[k - 1] < 0.0))
+      steps.push_back(std::abs(voltage[k] - voltage[k - 1] - resistance * (current[k] - current[k - 1])));
+  if (steps.empty()) return;
+  // The median, since the first sample after an edge may still have the voltage that turns the current
+  // around: one step in ten made 2 V of the 0.3 V of a gimbal motor's noise.
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  constexpr double deviation_of_median = 1.4826;  // of a normal distribution
+  const double deviation = deviation_of_median * *middle;
+  rises.noise_square += 0.5 * deviation * deviation;
+}
+}  // namespace
+
 InducedVoltage induced_in_waves(const Waveforms& seen, const MotorKnowledge& known, std::size_t half_period,
                                 std::size_t first, std::size_t end) {
   constexpr std::size_t fewest_samples = 10;
   InducedVoltage none{0.0, std::numeric_limits<double>::infinity()};
-  const auto voltage = seen.of("voltage"), current = seen.of("current");
-  end = std::min(end, voltage.size());
-  if (half_period < fewest_samples) return none;
-  const auto mean_over = [&](std::size_t from, std::size_t to) {
-    double sum = 0.0;
-    for (std::size_t k = from; k < to; ++k) sum += voltage[k] - known.resistance * current[k];
-    return sum / static_cast<double>(to - from);
-  };
-  std::vector<double> rises;
-  for (std::size_t begin = first; begin + half_period <= end; begin += half_period) {
-    const double direction =
-        bench::mean_of(current.subspan(begin + 3 * half_period / 10, half_period * 6 / 10)) < 0.0 ? -1.0
-                                                                                                  : 1.0;
-    const double early = mean_over(begin + 3 * half_period / 10, begin + 6 * half_period / 10);
-    const double late = mean_over(begin + 7 * half_period / 10, begin + half_period);
-    // Their middles are four tenths of a half wave apart.
-    rises.push_back(direction * (late - early) / 0.4);
-  }
-  if (rises.size() < 2) return none;
+  const auto current = seen.of("current");
+  end = std::min(end, current.size());
+  // In shorter ones the current controller is still at it: 2 V of a standing motor's in 2 ms, 0.3 V in 4 ms.
+  constexpr double shortest_wave = 0.0035;  // s
+  if (half_period < fewest_samples || static_cast<double>(half_period) * seen.interval < shortest_wave)
+    return none;
+  Rises rises;
+  add_component(rises, seen.of("voltage"), current, known.resistance, half_period, first, end);
+  if (seen.channels.contains("voltage_d"))
+    add_component(rises, seen.of("voltage_d"), current, 0.0, half_period, first, end);
+  const auto waves = static_cast<double>(rises.squares.size());
+  if (waves < 2.0) return none;
   // Of the samples, not of the rises: a synchronous motor under a dead encoder swings, and each wave differs.
   double square = 0.0;
-  for (const double rise : rises) square += rise * rise;
-  std::vector<double> steps;
-  for (std::size_t k = first + 1; k < end; ++k)
-    if ((current[k] < 0.0) == (current[k - 1] < 0.0))
-      steps.push_back(voltage[k] - voltage[k - 1] - known.resistance * (current[k] - current[k - 1]));
-  const double noise = bench::deviation_of(steps) / std::numbers::sqrt2;
-  const double error = noise * std::sqrt(2.0 / (0.3 * static_cast<double>(half_period))) / 0.4;
-  return {std::sqrt(square / static_cast<double>(rises.size())),
-          error * (1.0 / std::sqrt(static_cast<double>(rises.size())) + 0.2)};
+  for (const double one : rises.squares) square += one;
+  const double error =
+      std::sqrt(rises.noise_square) * std::sqrt(2.0 / (0.3 * static_cast<double>(half_period))) / 0.4;
+  return {std::sqrt(square / waves), error * (1.0 / std::sqrt(waves) + 0.2)};
 }
 
 InducedVoltage induced_in_push(const Waveforms& seen, const MotorKnowledge& known) {
@@ -111,7 +138,12 @@ Waveforms pull(Bench& bench, const MotorKnowledge& known, double stroke, double 
 
 void centre_handle(Bench& bench, const MotorKnowledge& known) {
   // The device excites no torque before.
-  if (!known.brushed() && bench.number("measured.commutation_known") == 0.0)
+  const bool lost = !known.brushed() && bench.number("measured.commutation_known") == 0.0;
+  if (lost && known.commutation_found)
+    throw StepFailed({"encoder_dead",
+                      "the rotor's electrical angle, which this run has found, is not known any more",
+                      "check the encoder's cable and supply, and encoder.kind"});
+  if (lost)
     throw StepFailed({"commutation_unknown", "the rotor's electrical angle is not known in this power cycle",
                       "calibrate the encoder as well: --steps encoder,mechanical"});
   double away = bench.displacement();
@@ -144,6 +176,8 @@ void centre_handle(Bench& bench, const MotorKnowledge& known) {
 namespace {
 constexpr int ramp_waves = 8;  // half periods
 constexpr int slowest_half_period = 3000;
+// Counts of a swing that leaves no doubt that the encoder lives and the handle is free.
+constexpr double clear_swing = 10.0;
 }  // namespace
 
 // In the middle of a half wave the handle turns back: there the wave ends, since nothing brakes it
@@ -159,12 +193,27 @@ ExcitationPlan Shaking::wave(std::size_t ticks) const {
   return plan;
 }
 
-// Longer ones would take a free handle through all of the travel, by what this axis was found to weigh.
-int Shaking::longest() const {
+// A square wave of force swings a free mass by force x T^2 / (4 mass), peak to peak.
+int Shaking::half_period_of(double stroke) const {
   if (!(known_.mass_known && known_.mass > 0.0 && known_.torque_constant > 0.0)) return slowest_half_period;
-  // A square wave of force swings a free mass by force x T^2 / (4 mass), peak to peak.
-  const double time = 2.0 * std::sqrt(bench_.travel() * known_.mass / (known_.force_per_ampere() * current_));
+  const double time = 2.0 * std::sqrt(stroke * known_.mass / (known_.force_per_ampere() * current_));
   return static_cast<int>(std::clamp(time / known_.tick, 20.0, static_cast<double>(slowest_half_period)));
+}
+
+// A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by the
+// record.
+bool Shaking::brakes() const {
+  return !known_.brushed();
+}
+
+// s, while the wave comes up: friction holds the handle at first.
+double Shaking::still_in_ramp() const {
+  return std::max(0.1, 4.0 * half_period_ * known_.tick);
+}
+
+// s: the handle turns back in each half wave.
+double Shaking::still_in_wave() const {
+  return std::max(0.03, 2.0 * half_period_ * known_.tick);
 }
 
 std::string Shaking::evidence(const InducedVoltage& induced) const {
@@ -196,15 +245,30 @@ Waveforms Shaking::record_centred(const ExcitationPlan& excitation, const Captur
 }
 
 void Shaking::prepare() {
+  std::vector<std::string> channels = {"count", "voltage", "current"};
+  // Under a dead encoder its rotor turns away from the frame that stands, and the voltage with it.
+  if (!known_.brushed()) channels.push_back("voltage_d");
   int blind = 0;
+  // Longer waves would take a free handle through all of the travel, by what this axis was found to weigh.
+  const int longest = half_period_of(bench_.travel());
+  const int longest_standing = half_period_of(stroke_);
+  double clearly_seen = 0.0;  // m, by a wave that was no longer than this one
   for (int attempt = 0; attempt < 40; ++attempt) {
     bench_.progress(fmt::format("shaking: {:.1f} ms half period", 1000.0 * half_period_ * known_.tick));
     const auto ticks = static_cast<std::size_t>((ramp_waves + 6) * half_period_);
     const int interval = static_cast<int>(std::max<std::size_t>(1, ticks / 280));
     // The wave drifts where friction, cogging or gravity want it.
+    StillLimits still;
+    // A wave that has moved the handle before does so again before it is up; one whose voltage says that it
+    // did must be seen to do so by the longer wave.
+    if (brakes()) {
+      still.after_motion = still_in_wave();
+      if (blind > 0) still.from_start = (ramp_waves + 1) * half_period_ * known_.tick;
+      if (clearly_seen > 0.0) still.from_start = still_in_ramp();
+    }
     const Waveforms seen = record_centred(
         wave(5 * static_cast<std::size_t>(half_period_)),
-        {{"count", "voltage", "current"}, ticks / static_cast<std::size_t>(interval), interval, 0.0});
+        {channels, ticks / static_cast<std::size_t>(interval), interval, 0.0, still, brakes()});
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel &&
         stroke_ > 0.02 * bench_.travel()) {
       stroke_ *= 0.6;
@@ -212,24 +276,34 @@ void Shaking::prepare() {
       continue;
     }
     require_no_trip(seen);
+    if (seen.empty()) throw_standing(bench_, known_, false, "shaken, the encoder counts nothing");
     const auto count = seen.of("count");
     const auto moving = count.last(count.size() * 4 / (ramp_waves + 6));
     seen_ = bench::span_of(moving) * known_.count_length();
     double largest_factor = 2.0;
-    if (stands(moving)) {
+    if (seen.stood || stands(moving)) {
       const auto half = static_cast<std::size_t>(half_period_ / interval);
-      const InducedVoltage induced = induced_in_waves(seen, known_, half, ramp_waves * half, seen.samples());
+      const std::size_t first = seen.stood ? 0 : ramp_waves * half;
+      const InducedVoltage induced = induced_in_waves(seen, known_, half, first, seen.samples());
+      const bool turns = induced.sure(known_, current_);
+      // What a shorter wave has moved, a longer one moves too: the encoder has died or the handle is held,
+      // and a wave that is longer still would only throw it farther.
+      if (seen.stood || clearly_seen > 0.0)
+        throw_standing(bench_, known_, turns, evidence(induced) + ", which it has counted before");
       // A coarse encoder may not yet show what the voltage does: twice the stroke shows whether it is that.
-      if (induced.sure(known_, current_)) {
+      if (turns) {
         largest_factor = 1.4;
         if (++blind == 2) throw_standing(bench_, known_, true, evidence(induced));
       }
+      // What holds a handle that would long have swung holds it however long the wave is.
+      if (half_period_ >= longest_standing) break;
     }
     if (seen_ >= 0.7 * stroke_ && seen_ <= 1.4 * stroke_) return;
-    if (half_period_ >= longest()) break;
+    if (half_period_ >= longest) break;
     const double factor =
         seen_ > 0.0 ? std::clamp(std::sqrt(stroke_ / seen_), 0.4, largest_factor) : largest_factor;
-    half_period_ = std::clamp(static_cast<int>(std::lround(half_period_ * factor)), 20, longest());
+    clearly_seen = factor >= 1.0 && seen_ >= clear_swing * known_.count_length() ? seen_ : 0.0;
+    half_period_ = std::clamp(static_cast<int>(std::lround(half_period_ * factor)), 20, longest);
   }
   if (seen_ > 0.3 * stroke_) return;
   throw StepFailed({"motor_blocked",
@@ -244,10 +318,9 @@ Waveforms Shaking::record(const std::vector<std::string>& channels, std::size_t 
   for (int attempt = 1;; ++attempt) {
     // The link takes up to a tenth of a second until the capture begins.
     const ExcitationPlan plan = wave(ticks + 6000);
-    // A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by
-    // the record.
-    const double still = known_.brushed() ? 0.0 : std::max(0.1, 4.0 * half_period_ * known_.tick);
-    Waveforms seen = record_centred(plan, {channels, samples, interval, plan.ramp, still});
+    StillLimits still;
+    if (brakes()) still = {still_in_ramp(), still_in_wave()};
+    Waveforms seen = record_centred(plan, {channels, samples, interval, plan.ramp, still, brakes()});
     // A long record may drift out of the travel: a shorter wave drifts less.
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel && attempt < attempts) {
       half_period_ = std::max(20, half_period_ * 4 / 5);
@@ -255,7 +328,6 @@ Waveforms Shaking::record(const std::vector<std::string>& channels, std::size_t 
     }
     require_no_trip(seen);
     require_living_encoder(seen, interval);
-    bench_.wait_until_finished(still);
     return seen;
   }
 }

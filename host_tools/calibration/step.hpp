@@ -23,6 +23,7 @@ namespace kmax::calibration {
 using bench::Bench;
 using bench::CapturePlan;
 using bench::ExcitationPlan;
+using bench::StillLimits;
 using bench::Trip;
 using bench::Waveforms;
 
@@ -52,6 +53,7 @@ struct MotorKnowledge {
   bool mass_known = false;          // found in this run, or by a calibration before
   bool calibrated = false;          // motor.calibrated: what the parameters say was measured
   bool searches_index = false;      // counts are referred to an index
+  bool commutation_found = false;   // in this run
   bool hand_checked = false;        // a hand has shown that encoder.direction is right
 
   // What the excitation uses.

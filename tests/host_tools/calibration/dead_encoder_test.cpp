@@ -9,7 +9,8 @@ using simulation::Defect;
 /// Where the handle really was while a defect came up, which a device with a dead encoder cannot know.
 struct Course {
   std::string cause;
-  double farthest = 0.0;  // m from the beginning
+  double farthest = 0.0;    // m from the beginning
+  double afterwards = 0.0;  // m from where the defect came up
 };
 
 /// `planted_at`: counted in reports of progress; 0: from the beginning.
@@ -18,11 +19,18 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
   Course course;
   const auto& handle = device.drives().drive(0).handle();
   const double start = handle.position();
-  const auto look = [&] { course.farthest = std::max(course.farthest, std::abs(handle.position() - start)); };
+  double planted = start;
+  const auto look = [&] {
+    course.farthest = std::max(course.farthest, std::abs(handle.position() - start));
+    course.afterwards = std::max(course.afterwards, std::abs(handle.position() - planted));
+  };
   if (planted_at == 0) device.plant(Defect::encoder_stuck);
   device.on_progress = [&] {
     look();
-    if (device.length.whole == planted_at) device.plant(Defect::encoder_stuck);
+    if (device.length.whole != planted_at) return;
+    device.plant(Defect::encoder_stuck);
+    planted = handle.position();
+    course.afterwards = 0.0;
   };
   const auto report = device.calibrate(settings);
   // A handle that has been thrown still moves.
@@ -47,16 +55,20 @@ TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
 TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
   const int whole = length_of(GetParam()).whole;
-  const int points = in_a_soak() ? 9 : 4;
-  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation. 222 mm
-  // is the farthest that has been seen, where gimbal_b's encoder dies at about half of the way, just before
-  // the motor is taken for blocked; a few reports later it is within the bound of the others.
-  const double farthest = (GetParam() == std::string("gimbal_b") ? 12.0 : 5.0) * settings.travel;
+  // Which report of progress it is decides what the handle was doing: a few points prove nothing. Of 210 in
+  // gimbal_b's calibration the farthest was 40 mm.
+  const int points = in_a_soak() ? 200 : 30;
+  // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation, and the
+  // shorted winding after it.
+  const double farthest = 3.0 * settings.travel;
   for (int point = 1; point < points; ++point) {
     const int at = whole * point / points;
     const Course course = course_of(GetParam(), settings, at);
     // It cannot always be told from a blocked motor or a slipping encoder by then.
-    EXPECT_NE(course.cause, "") << "at " << at << " of " << whole;
+    // When the last samples are fetched there is nothing left that it could spoil.
+    if (course.afterwards > 0.002) {
+      EXPECT_NE(course.cause, "") << "at " << at << " of " << whole;
+    }
     EXPECT_LE(course.farthest, farthest) << course.cause << " at " << at << " of " << whole;
   }
 }

@@ -1,0 +1,51 @@
+#include "host_tools/bench/still_watch.hpp"
+
+#include <gtest/gtest.h>
+
+namespace kmax::bench::still_watch_test {
+
+using std::chrono::milliseconds;
+
+constexpr StillLimits limits{.from_start = 0.1, .after_motion = 0.03};
+
+TEST(StillWatch, WithoutLimitsWatchesNothing) {
+  StillWatch watch;
+  EXPECT_FALSE(watch.active());
+  EXPECT_FALSE(watch.stands(0.0, 0.0, std::chrono::hours(1)));
+}
+
+TEST(StillWatch, WaitsLongerForAHandleThatHasNotMovedYet) {
+  StillWatch watch(limits, 500.0, milliseconds(0));
+  EXPECT_FALSE(watch.stands(500.0, 0.0, milliseconds(99)));
+  EXPECT_TRUE(watch.stands(501.0, 0.0, milliseconds(101)));
+}
+
+TEST(StillWatch, EndsSoonAfterAMotionThatWasClear) {
+  StillWatch watch(limits, 500.0, milliseconds(0));
+  EXPECT_FALSE(watch.stands(510.0, 0.0, milliseconds(50)));
+  EXPECT_FALSE(watch.stands(510.0, 0.0, milliseconds(80)));
+  EXPECT_TRUE(watch.stands(510.0, 0.0, milliseconds(81)));
+}
+
+TEST(StillWatch, TakesAFewCountsOfNoiseForNoMotion) {
+  StillWatch watch(limits, 500.0, milliseconds(0));
+  EXPECT_FALSE(watch.stands(509.0, 0.0, milliseconds(10)));
+  EXPECT_FALSE(watch.stands(509.0, 0.0, milliseconds(60)));
+  EXPECT_TRUE(watch.stands(509.0, 0.0, milliseconds(111)));
+}
+
+TEST(StillWatch, SeesASpeedWhereCountsAreFar) {
+  StillWatch watch(limits, 500.0, milliseconds(0));
+  EXPECT_FALSE(watch.stands(500.0, 0.0021, milliseconds(150)));
+  EXPECT_FALSE(watch.stands(500.0, 0.0, milliseconds(250)));
+  EXPECT_TRUE(watch.stands(500.0, -0.0019, milliseconds(251)));
+}
+
+TEST(StillWatch, WatchesAfterMotionAloneIfNoOtherLimitIsSet) {
+  StillWatch watch({.from_start = 0.0, .after_motion = 0.03}, 0.0, milliseconds(0));
+  EXPECT_FALSE(watch.stands(0.0, 0.0, std::chrono::seconds(10)));
+  EXPECT_FALSE(watch.stands(-10.0, 0.0, std::chrono::seconds(11)));
+  EXPECT_TRUE(watch.stands(-10.0, 0.0, std::chrono::seconds(12)));
+}
+
+}  // namespace kmax::bench::still_watch_test
