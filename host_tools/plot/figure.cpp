@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace kmax::plot {
 
@@ -13,7 +14,9 @@ namespace {
 
 // Okabe and Ito's palette, blue first.
 constexpr std::array colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"};
-constexpr std::array point_types = {7, 5, 9, 13, 11, 6, 4};
+constexpr std::array point_types = {7, 5, 9, 13, 11, 6, 4, 8};
+// The symbols come round at another time than the colours: fifty-six curves differ.
+static_assert(std::gcd(colours.size(), point_types.size()) == 1);
 
 bool can_be_shown(double value, bool logarithmic) {
   return std::isfinite(value) && (!logarithmic || value > 0.0);

@@ -135,6 +135,18 @@ class UsbCanAdapter : public testing::Test {
   bool flash_was_erased = false;  ///< disarmed, meanwhile there are no ticks
 };
 
+// A PC's driver works the timing of every bit rate out of this number (GS_USB_BREQ_BT_CONST, second word).
+TEST_F(UsbCanAdapter, SaysTheClockByWhichTheBusRuns) {
+  const virtual_board::UsbTransferResult said = bench.control({0xC1, 4, 0, 0, 0, 0, 40, 0});
+  ASSERT_EQ(said.data.size(), 40u);
+  std::uint32_t clock = 0;
+  for (unsigned i = 0; i < 4; ++i) clock |= std::uint32_t{said.data[4 + i]} << 8 * i;
+  // RM0090: bxCAN is on APB1, a quarter of 168 MHz. By it the timing that the host of these tests asks for,
+  // 1 + 5 + 8 + 7 quanta of two clocks each, is the 1 Mbit/s at which the bus answers it.
+  EXPECT_EQ(clock, 42'000'000u);
+  EXPECT_EQ(clock / (2 * (1 + 5 + 8 + 7)), 1'000'000u);
+}
+
 TEST_F(UsbCanAdapter, TheSecondChannelIsOnTheBusAndTheFirstIsNot) {
   second.send(numbered(0x123, 1));
   bench.board->run_for(0.005);
