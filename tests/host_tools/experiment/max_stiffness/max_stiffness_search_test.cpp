@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/experiment/max_stiffness/max_stiffness_study.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
 
 namespace kmax::experiment::max_stiffness_search_test {
@@ -64,6 +65,25 @@ TEST(MaxStiffnessSearch, GoesDownFromAnUnstableStartWhereItIsAskedTo) {
   never.device.delay = 0.1;
   steps.step = 400.0;
   EXPECT_EQ(search_max_stiffness(never, {}, steps).stiffness, 0.0) << "and ends above 0";
+}
+
+// What docs/speed_and_error.md says of the accuracy that a mean needs; a person alone may differ by more.
+// A method of first order with the same step is found out.
+TEST(MaxStiffnessSearch, OneStepOfRk4ATickGivesTheMeanOfThePeopleWithinAStepOfTheSearch) {
+  const SubjectSet set = open_subject_set("clipped");
+  const auto mean_with = [&](const simulation::IntegratorConfig& integrator) {
+    double sum = 0.0;
+    for (const Subject& subject : set.subjects) {
+      TouchSetup setup = touch_setup(set.device, subject.person, stiffness_conditions().front());
+      setup.integrator = integrator;
+      sum += search_max_stiffness(setup, {}, {}).stiffness;
+    }
+    return sum / static_cast<double>(set.subjects.size());
+  };
+  const double exact = mean_with({});
+  EXPECT_GT(exact, 1e3);
+  EXPECT_NEAR(mean_with({simulation::IntegratorKind::rk4, 1.0}), exact, 100.0);
+  EXPECT_GT(std::abs(mean_with({simulation::IntegratorKind::semi_implicit_euler, 1.0}) - exact), 100.0);
 }
 
 // Where within a sample the surface is met decides near the limit.
