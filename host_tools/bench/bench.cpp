@@ -22,7 +22,16 @@ constexpr double longest_excitation = 70.0;  // s, longer than any plan's
 // Of different lengths: a handle that is shaken in step with the looks would be found at rest at its turning
 // point each time.
 constexpr microseconds between_looks[] = {microseconds(20'000), microseconds(12'700), microseconds(7'300)};
+// A capture is looked at every 20 ms: a handle that swings in 21 ms was met where it turns back time and
+// again.
+constexpr microseconds between_doubts[] = {microseconds(3'100), microseconds(7'900), microseconds(5'300)};
 constexpr microseconds start_patience{2'000'000};
+
+// A handle that coasted out of its travel, or a host that was held up.
+bool is_harmless(const Trip& trip) {
+  return !trip.remains &&
+         (trip.fault == firmware::Fault::excitation_travel || trip.fault == firmware::Fault::link_silent);
+}
 
 bool starting(firmware::Refusal refusal) {
   return refusal == firmware::Refusal::power_stage_not_ready || refusal == firmware::Refusal::store_busy;
@@ -189,9 +198,7 @@ void Bench::disarm() {
   const device::DriveStatus status = drive_.status();
   if (!status.faulty()) return;
   const Trip found = cleared(status);
-  const bool harmless =
-      found.fault == firmware::Fault::excitation_travel || found.fault == firmware::Fault::link_silent;
-  if (!harmless || found.remains) unseen_trip_ = found;
+  if (!is_harmless(found)) unseen_trip_ = found;
 }
 
 void Bench::brake() {
@@ -199,6 +206,10 @@ void Bench::brake() {
   still_watch_ = {};
   journal_.set_temporary(ExcitationPlan{.kind = "voltage"}.assignments());
   wait(0.1);
+  const std::optional<Trip> tripped = trip();
+  // A fast handle with a small current.limit: it coasts, and nothing is wrong with the axis.
+  if (tripped && tripped->fault != firmware::Fault::over_current && !is_harmless(*tripped))
+    unseen_trip_ = tripped;
 }
 
 void Bench::begin_still_watch(const StillLimits& limits) {
@@ -213,8 +224,12 @@ microseconds Bench::next_look() {
 
 bool Bench::stands() {
   if (!still_watch_.active() || !armed_) return false;
-  const double count = number("measured.count"), velocity = number("measured.velocity");
-  return still_watch_.stands(count, velocity, device_.link().now());
+  for (std::size_t look = 0;; ++look) {
+    const double count = number("measured.count"), velocity = number("measured.velocity");
+    const bool stands = still_watch_.stands(count, velocity, device_.link().now());
+    if (stands || !still_watch_.doubtful()) return stands;
+    device_.link().wait(between_doubts[look % std::size(between_doubts)]);
+  }
 }
 
 void Bench::finish_and_brake(Waveforms& seen) {
@@ -222,9 +237,13 @@ void Bench::finish_and_brake(Waveforms& seen) {
   while (armed_ && number("measured.excitation_finished") == 0.0) {
     progress_("");
     seen.trip = trip();
-    if (seen.trip) return;
-    seen.stood = stands();
-    if (seen.stood) break;
+    if (seen.trip) {
+      // The samples are there, and the device has ended what a silent host left running.
+      if (seen.trip->fault == firmware::Fault::link_silent) seen.trip.reset();
+      return;
+    }
+    // What is in the samples has been seen: whoever looks next finds out why it stands.
+    if (stands()) break;
     if (device_.link().now() >= end)
       throw device::DeviceError(
           fmt::format("axis {}: the excitation does not end; look at excitation.duration", drive_.axis()));
@@ -272,7 +291,7 @@ Waveforms Bench::record_heard(const ExcitationPlan& excitation, const CapturePla
 Waveforms Bench::record_once(const ExcitationPlan& excitation, const CapturePlan& plan, double reach,
                              Afterwards afterwards) {
   arm(reach);
-  begin_still_watch(plan.still);
+  begin_still_watch({});
   device::CaptureReader reader(device_);
   const bool from_start = plan.delay <= 0.0;
   if (from_start) begin_capture(reader, plan, firmware::CaptureTrigger::excitation);
@@ -282,6 +301,7 @@ Waveforms Bench::record_once(const ExcitationPlan& excitation, const CapturePlan
   run_ = (run_ + 1) % 65536;
   texts.push_back(fmt::format("excitation.run={}", run_));
   journal_.set_temporary(texts);
+  begin_still_watch(plan.still);
   if (!from_start) {
     wait(plan.delay);
     begin_capture(reader, plan, firmware::CaptureTrigger::now);

@@ -108,10 +108,6 @@ class Bench {
   /// A fault that is found there is cleared if its cause is gone; arming after it throws AxisTripped with it,
   /// unless it is that of a handle that coasted out of its travel, or of a silent host.
   void disarm();
-  /// Shorts the winding, and waits for a tenth of a second until that has taken the speed of the handle,
-  /// whatever its encoder says. A handle of 0.1 kg with little friction, let go at 0.6 m/s, would coast for
-  /// 60 mm.
-  void brake();
   /// A fault whose cause stays, or a refusal to arm: nothing more can be measured.
   bool unusable() const { return unusable_; }
   /// A trip that disarm() found and nobody has taken yet.
@@ -144,7 +140,13 @@ class Bench {
   void begin_capture(device::CaptureReader& reader, const CapturePlan& plan,
                      firmware::CaptureTrigger trigger);
   Waveforms finish_capture(device::CaptureReader& reader, Afterwards afterwards, bool brakes);
+  // Until the excitation's duration is over, the axis has tripped, or the encoder stands for longer than
+  // allowed.
   void finish_and_brake(Waveforms& seen);
+  // Shorts the winding for a tenth of a second, whatever the encoder says. The axis stays armed, at zero
+  // volts, unless it trips. A handle of 0.1 kg with little friction, let go at 0.6 m/s, would coast for 60
+  // mm.
+  void brake();
   void begin_still_watch(const StillLimits& limits);
   std::chrono::microseconds next_look();
   bool stands();

@@ -40,7 +40,7 @@ struct CapturePlan {
   int interval = 1;        ///< ticks
   double delay = 0.0;      ///< s from the start of the excitation; 0: from its first tick
   StillLimits still{};     ///< an encoder that counts nothing for longer ends the excitation and the capture
-  bool brake = false;      ///< Bench::brake() once the excitation is over, before the samples are read
+  bool brake = false;      ///< once the excitation is over: the winding is shorted, then the samples are read
   std::size_t before = 0;  ///< samples from before the first tick; with `delay` 0 only
 };
 
@@ -58,7 +58,7 @@ struct Waveforms {
   std::map<std::string, std::vector<double>> channels;
   std::size_t before = 0;    ///< samples before the first tick; fewer than asked for if it came soon
   std::optional<Trip> trip;  ///< then they may be short or empty
-  bool stood = false;        ///< ended because of CapturePlan::still, likewise
+  bool stood = false;        ///< cut off because of CapturePlan::still: likewise
 
   std::span<const double> of(const std::string& name) const { return channels.at(name); }
   std::size_t samples() const { return channels.empty() ? 0 : channels.begin()->second.size(); }

@@ -107,7 +107,7 @@ void FieldSweep::prepare() {
   // 64 pole pairs are the most there are.
   if (counts < std::max(2.0, 0.3 * known_.counts_per_turn / 64.0 / 2.0) || at_last < steady * counts / 3.0) {
     const Waveforms fro = turn(-half_turn, {"count", "voltage_d"}, 600);
-    diagnose_still(counts, to, fro);
+    diagnose_still(at_last, to, fro);
   }
   const double per_radian = (after - before) / half_turn;  // m
   metres_per_radian_ = per_radian;

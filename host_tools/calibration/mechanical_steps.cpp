@@ -282,9 +282,10 @@ void map_compensation(Calibration& run) {
   // Nothing is fitted to this last way, and nothing else would say that its encoder has died.
   const double left = bench.displacement();
   if (std::abs(left) > 0.25 * reach)
-    throw_standing(bench, known, false,
-                   fmt::format("led back by {:.1f} mm to the middle, the handle is {:.1f} mm away from it",
-                               1000.0 * std::abs(end), 1000.0 * std::abs(left)));
+    throw StepFailed({"not_led_back",
+                      fmt::format("led back by {:.1f} mm to the middle, the handle is {:.1f} mm away from it",
+                                  1000.0 * std::abs(end), 1000.0 * std::abs(left)),
+                      "see whether something holds the handle; else check the encoder's cable and mounting"});
   std::vector<CoggingSweep> views;
   for (const RecordedSweep& one : sweeps) views.push_back({one.force, one.angle});
   CoggingFitConfig config;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "host_tools/calibration/field_sweep.hpp"
 
@@ -93,17 +92,31 @@ InducedVoltage induced_in_push(const Waveforms& seen, const MotorKnowledge& know
   return {bench::mean_of(induced), bench::deviation_of(induced) / std::sqrt(static_cast<double>(length))};
 }
 
+namespace {
+// Index of the last sample that differs from the one before; 0: none does.
+std::size_t last_change(std::span<const double> count) {
+  for (std::size_t k = count.size(); k > 1; --k)
+    if (count[k - 1] != count[k - 2]) return k - 1;
+  return 0;
+}
+}  // namespace
+
 bool stands(std::span<const double> count) {
   return bench::span_of(count) < 2.0;
 }
 
+namespace {
+// Of a synchronous motor, half an electrical turn. Throws StepFailed if the encoder does not see it.
+void require_turn_by_field(Bench& bench, const MotorKnowledge& known) {
+  bench.disarm();
+  FieldSweep(bench, known).prepare();
+}
+}  // namespace
+
 void throw_standing(Bench& bench, const MotorKnowledge& known, bool induced, const std::string& evidence) {
   // A synchronous motor whose field stands still has come to rest in it. Dragged along by a field that turns
   // it shows whether it can turn.
-  if (!induced && !known.brushed()) {
-    bench.disarm();
-    FieldSweep(bench, known).prepare();
-  }
+  if (!induced && !known.brushed()) require_turn_by_field(bench, known);
   if (induced) throw_encoder_dead(evidence);
   throw_motor_blocked(evidence);
 }
@@ -111,6 +124,7 @@ void throw_standing(Bench& bench, const MotorKnowledge& known, bool induced, con
 namespace {
 constexpr double near_enough = 0.15;   // of the travel, where there is nothing to do
 constexpr double arrived = 0.04;       // of the travel
+constexpr double progress = 0.01;      // of the travel, by a piece that need not be longer
 constexpr double first_piece = 0.04;   // s
 constexpr double longest_piece = 0.3;  // s
 constexpr int most_pieces = 200;
@@ -156,7 +170,10 @@ void centre_handle(Bench& bench, const MotorKnowledge& known) {
     if (std::abs(away) < arrived * bench.travel()) break;
     const Waveforms seen = pull(bench, known, -away, duration, reach);
     if (!stands(seen.of("count"))) {
-      duration = first_piece;
+      // A detent that gives way but does not let go wants a longer pull as well.
+      const bool nearer = std::abs(away) - std::abs(bench.displacement()) >= progress * bench.travel();
+      duration = nearer ? first_piece : 1.4 * duration;
+      if (duration > longest_piece) break;
       continue;
     }
     const bool induced = induced_in_push(seen, known).sure(known, known.current);
@@ -176,12 +193,12 @@ void centre_handle(Bench& bench, const MotorKnowledge& known) {
 namespace {
 constexpr int ramp_waves = 8;  // half periods
 constexpr int slowest_half_period = 3000;
-// Counts of a swing that leaves no doubt that the encoder lives and the handle is free.
-constexpr double clear_swing = 10.0;
+// Of the stroke: a swing that leaves no doubt that the handle is free. A gimbal motor's slid by 0.5 mm of the
+// 5 mm into a detent.
+constexpr double clear_swing = 0.25;
 }  // namespace
 
-// In the middle of a half wave the handle turns back: there the wave ends, since nothing brakes it
-// afterwards.
+// In the middle of a half wave the handle turns back: there the wave ends, so that little is left to brake.
 ExcitationPlan Shaking::wave(std::size_t ticks) const {
   const std::size_t half_waves = ticks / static_cast<std::size_t>(half_period_) + 1;
   ExcitationPlan plan;
@@ -200,31 +217,29 @@ int Shaking::half_period_of(double stroke) const {
   return static_cast<int>(std::clamp(time / known_.tick, 20.0, static_cast<double>(slowest_half_period)));
 }
 
-// A synchronous motor runs on in the field of a frozen angle; a brushed one only shakes, and is judged by the
-// record.
-bool Shaking::brakes() const {
+// Under an encoder that stands. A synchronous motor runs on in the field of a frozen angle; a brushed one
+// only shakes, and is judged by the record.
+bool Shaking::runs_on() const {
   return !known_.brushed();
 }
 
-// s, while the wave comes up: friction holds the handle at first.
-double Shaking::still_in_ramp() const {
-  return std::max(0.1, 4.0 * half_period_ * known_.tick);
-}
-
-// s: the handle turns back in each half wave.
-double Shaking::still_in_wave() const {
-  return std::max(0.03, 2.0 * half_period_ * known_.tick);
+// Friction holds the handle while the wave comes up; later it turns back in each half wave.
+StillLimits Shaking::still_in_wave() const {
+  const double half_wave = half_period_ * known_.tick;
+  return {std::max(0.1, 4.0 * half_wave), std::max(0.03, 2.0 * half_wave),
+          clear_swing * stroke_ / known_.count_length()};
 }
 
 std::string Shaking::evidence(const InducedVoltage& induced) const {
-  return fmt::format(
-      "{:.3g} A to and fro, for {:.1f} ms each, induce {:.3f} V +- {:.3f} V and move the count by less than "
-      "2",
-      current_, 1000.0 * half_period_ * known_.tick, induced.volts, induced.error);
+  std::string text =
+      fmt::format("{:.3g} A to and fro, for {:.1f} ms each, ", current_, 1000.0 * half_period_ * known_.tick);
+  if (std::isfinite(induced.error))
+    text += fmt::format("induce {:.3f} V +- {:.3f} V and ", induced.volts, induced.error);
+  return text + "move the count by less than 2";
 }
 
 void Shaking::require_living_encoder(const Waveforms& seen, int interval) const {
-  if (seen.empty()) throw_standing(bench_, known_, false, "shaken, the encoder counts nothing");
+  if (seen.empty()) throw_standing(bench_, known_, false, "the encoder of the shaken handle counts nothing");
   const auto half = static_cast<std::size_t>(half_period_ / interval);
   // The last one and a half waves: whatever went before, there the encoder stands.
   const std::size_t part = std::min(seen.samples(), std::max(seen.samples() / 5, 3 * half / 2));
@@ -259,50 +274,54 @@ void Shaking::prepare() {
     const int interval = static_cast<int>(std::max<std::size_t>(1, ticks / 280));
     // The wave drifts where friction, cogging or gravity want it.
     StillLimits still;
-    // A wave that has moved the handle before does so again before it is up; one whose voltage says that it
-    // did must be seen to do so by the longer wave.
-    if (brakes()) {
-      still.after_motion = still_in_wave();
-      if (blind > 0) still.from_start = (ramp_waves + 1) * half_period_ * known_.tick;
-      if (clearly_seen > 0.0) still.from_start = still_in_ramp();
+    // A wave that has moved the handle before does so again before it is up.
+    if (runs_on()) {
+      still = still_in_wave();
+      if (clearly_seen == 0.0) still.from_start = 0.0;
     }
-    const Waveforms seen = record_centred(
-        wave(5 * static_cast<std::size_t>(half_period_)),
-        {channels, ticks / static_cast<std::size_t>(interval), interval, 0.0, still, brakes()});
+    const Waveforms seen =
+        record_centred(wave(5 * static_cast<std::size_t>(half_period_)),
+                       {channels, ticks / static_cast<std::size_t>(interval), interval, 0.0, still, true});
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel &&
         stroke_ > 0.02 * bench_.travel()) {
       stroke_ *= 0.6;
+      clearly_seen = 0.0;
       half_period_ = std::max(20, half_period_ * 2 / 3);
       continue;
     }
     require_no_trip(seen);
-    if (seen.empty()) throw_standing(bench_, known_, false, "shaken, the encoder counts nothing");
+    if (seen.empty())
+      throw_standing(bench_, known_, false, "the encoder of the shaken handle counts nothing");
     const auto count = seen.of("count");
     const auto moving = count.last(count.size() * 4 / (ramp_waves + 6));
     seen_ = bench::span_of(moving) * known_.count_length();
     double largest_factor = 2.0;
     if (seen.stood || stands(moving)) {
       const auto half = static_cast<std::size_t>(half_period_ / interval);
-      const std::size_t first = seen.stood ? 0 : ramp_waves * half;
+      // Of a wave that was cut off, what comes after the last thing that the encoder counted.
+      const std::size_t first = seen.stood ? (last_change(count) / half + 1) * half : ramp_waves * half;
       const InducedVoltage induced = induced_in_waves(seen, known_, half, first, seen.samples());
       const bool turns = induced.sure(known_, current_);
       // What a shorter wave has moved, a longer one moves too: the encoder has died or the handle is held,
       // and a wave that is longer still would only throw it farther.
       if (seen.stood || clearly_seen > 0.0)
-        throw_standing(bench_, known_, turns, evidence(induced) + ", which it has counted before");
+        throw_standing(bench_, known_, turns,
+                       evidence(induced) + (clearly_seen > 0.0 ? "; a shorter wave had moved it" : ""));
       // A coarse encoder may not yet show what the voltage does: twice the stroke shows whether it is that.
       if (turns) {
         largest_factor = 1.4;
-        if (++blind == 2) throw_standing(bench_, known_, true, evidence(induced));
+        if (++blind == 2 || half_period_ >= longest) throw_standing(bench_, known_, true, evidence(induced));
+        // It would run on in a longer wave; led by a field it goes no farther than that.
+        if (runs_on()) require_turn_by_field(bench_, known_);
       }
       // What holds a handle that would long have swung holds it however long the wave is.
-      if (half_period_ >= longest_standing) break;
+      if (!turns && half_period_ >= longest_standing) break;
     }
     if (seen_ >= 0.7 * stroke_ && seen_ <= 1.4 * stroke_) return;
     if (half_period_ >= longest) break;
     const double factor =
         seen_ > 0.0 ? std::clamp(std::sqrt(stroke_ / seen_), 0.4, largest_factor) : largest_factor;
-    clearly_seen = factor >= 1.0 && seen_ >= clear_swing * known_.count_length() ? seen_ : 0.0;
+    clearly_seen = factor >= 1.0 && seen_ >= clear_swing * stroke_ ? seen_ : 0.0;
     half_period_ = std::clamp(static_cast<int>(std::lround(half_period_ * factor)), 20, longest);
   }
   if (seen_ > 0.3 * stroke_) return;
@@ -319,8 +338,8 @@ Waveforms Shaking::record(const std::vector<std::string>& channels, std::size_t 
     // The link takes up to a tenth of a second until the capture begins.
     const ExcitationPlan plan = wave(ticks + 6000);
     StillLimits still;
-    if (brakes()) still = {still_in_ramp(), still_in_wave()};
-    Waveforms seen = record_centred(plan, {channels, samples, interval, plan.ramp, still, brakes()});
+    if (runs_on()) still = still_in_wave();
+    Waveforms seen = record_centred(plan, {channels, samples, interval, plan.ramp, still, true});
     // A long record may drift out of the travel: a shorter wave drifts less.
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel && attempt < attempts) {
       half_period_ = std::max(20, half_period_ * 4 / 5);

@@ -23,8 +23,8 @@ struct InducedVoltage {
 // From channels `voltage` and `current` (A, along the torque) while the current is a square wave: each half
 // wave's rise of voltage - resistance x current from its third to its sixth tenth to the last three; with a
 // channel `voltage_d` the rise of the vector. `half_period` in samples, the record begins with a half wave;
-// `first` and `end` bound the samples that count. Fewer than 10 samples in half a wave: 0 with an infinite
-// error.
+// `first` and `end` bound the samples that count. Fewer than 10 samples in half a wave, or
+// half waves of less than 3.5 ms, in which the current controller is still at work: 0 with an infinite error.
 InducedVoltage induced_in_waves(const Waveforms& seen, const MotorKnowledge& known, std::size_t half_period,
                                 std::size_t first, std::size_t end);
 
@@ -44,9 +44,9 @@ bool stands(std::span<const double> count);
 // excitation has all of the travel to both sides.
 //
 // A spring of 500 N/m, whose other end moves at 5 cm/s, pulls for 40 ms at a time: pulled for as long as the
-// way back takes, a handle whose encoder has died would be out of its travel by metres. A piece in which
-// nothing is counted is followed by one that is longer by two fifths, unless the motor shows by its induced
-// voltage that it turns.
+// way back takes, a handle whose encoder has died would be out of its travel by metres. A piece that
+// brings it no nearer is followed by one that is longer by two fifths, unless nothing is counted and the
+// motor shows by its induced voltage that it turns.
 //
 // Throws StepFailed: encoder_dead, and what trips.
 void centre_handle(Bench& bench, const MotorKnowledge& known);
@@ -78,12 +78,11 @@ class Shaking {
 
  private:
   ExcitationPlan wave(std::size_t ticks) const;
-  // ticks, by which a free handle swings by `stroke` (m, peak to peak); the slowest while its mass is not
+  // ticks, in which a free handle swings by `stroke` (m, peak to peak); the slowest while its mass is not
   // known.
   int half_period_of(double stroke) const;
-  bool brakes() const;
-  double still_in_ramp() const;
-  double still_in_wave() const;
+  bool runs_on() const;
+  StillLimits still_in_wave() const;
   // From the middle of the travel, where it cannot be seen that a record before it was cut off.
   Waveforms record_centred(const ExcitationPlan& excitation, const CapturePlan& plan);
   void require_living_encoder(const Waveforms& seen, int interval) const;

@@ -1,5 +1,7 @@
 #include "host_tools/calibration/procedure.hpp"
 
+#include <fmt/format.h>
+
 #include <numbers>
 
 #include "host_tools/base/errors.hpp"
@@ -83,6 +85,34 @@ TEST(Procedure, AnInterruptionAnywherePutsEverythingBackSaysSoAndDisarms) {
       EXPECT_EQ(device.parameters(), before) << scene;
       EXPECT_EQ(device.records(), 0u);
     });
+  }
+}
+
+// What watches for a dead encoder must not find one where friction, few counts or a slow host make a living
+// one look like it.
+TEST(Procedure, TakesNoLivingEncoderForADeadOne) {
+  struct Trouble {
+    const char* name;
+    double friction, counts;  // share of the scene's
+    std::chrono::milliseconds hold_up;
+  };
+  constexpr std::chrono::milliseconds none{0};
+  for (const char* scene_name : representative_scenes()) {
+    for (const Trouble& trouble :
+         {Trouble{"friction", 3.0, 1.0, none}, Trouble{"few counts", 1.0, 0.125, none},
+          Trouble{"host", 1.0, 1.0, std::chrono::milliseconds(200)},
+          Trouble{"all", 2.0, 0.25, std::chrono::milliseconds(70)}}) {
+      simulation::Scene scene = simulated_board::open_scene(scene_name);
+      scene.axes[0].device.friction *= trouble.friction;
+      const double counts = scene.axes[0].encoder.counts_per_turn * trouble.counts;
+      scene.axes[0].encoder.counts_per_turn = counts;
+      CalibratedDevice device(scene);
+      device.set({"modbus.baud_rate=115200", fmt::format("encoder.counts_per_turn={}", counts)});
+      device.on_progress = [&] {
+        if (device.length.whole % 7 == 0) device.link().wait(trouble.hold_up);
+      };
+      EXPECT_EQ(cause_of(device.calibrate()), "") << scene_name << ", " << trouble.name;
+    }
   }
 }
 
