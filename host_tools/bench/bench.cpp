@@ -242,8 +242,8 @@ void Bench::finish_and_brake(Waveforms& seen) {
       if (seen.trip->fault == firmware::Fault::link_silent) seen.trip.reset();
       return;
     }
-    // What is in the samples has been seen: whoever looks next finds out why it stands.
-    if (stands()) break;
+    seen.stood_afterwards = stands();
+    if (seen.stood_afterwards) break;
     if (device_.link().now() >= end)
       throw device::DeviceError(
           fmt::format("axis {}: the excitation does not end; look at excitation.duration", drive_.axis()));

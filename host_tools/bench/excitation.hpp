@@ -56,9 +56,10 @@ struct Trip {
 struct Waveforms {
   double interval = 50e-6;  ///< s between samples
   std::map<std::string, std::vector<double>> channels;
-  std::size_t before = 0;    ///< samples before the first tick; fewer than asked for if it came soon
-  std::optional<Trip> trip;  ///< then they may be short or empty
-  bool stood = false;        ///< cut off because of CapturePlan::still: likewise
+  std::size_t before = 0;         ///< samples before the first tick; fewer than asked for if it came soon
+  std::optional<Trip> trip;       ///< then they may be short or empty
+  bool stood = false;             ///< cut off because of CapturePlan::still: likewise
+  bool stood_afterwards = false;  ///< between the last sample and the end of the excitation
 
   std::span<const double> of(const std::string& name) const { return channels.at(name); }
   std::size_t samples() const { return channels.empty() ? 0 : channels.begin()->second.size(); }

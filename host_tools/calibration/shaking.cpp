@@ -267,7 +267,7 @@ void Shaking::prepare() {
   // Longer waves would take a free handle through all of the travel, by what this axis was found to weigh.
   const int longest = half_period_of(bench_.travel());
   const int longest_standing = half_period_of(stroke_);
-  double clearly_seen = 0.0;  // m, by a wave that was no longer than this one
+  bool moved_before = false;  // by a wave that was no longer than this one
   for (int attempt = 0; attempt < 40; ++attempt) {
     bench_.progress(fmt::format("shaking: {:.1f} ms half period", 1000.0 * half_period_ * known_.tick));
     const auto ticks = static_cast<std::size_t>((ramp_waves + 6) * half_period_);
@@ -277,7 +277,7 @@ void Shaking::prepare() {
     // A wave that has moved the handle before does so again before it is up.
     if (runs_on()) {
       still = still_in_wave();
-      if (clearly_seen == 0.0) still.from_start = 0.0;
+      if (!moved_before) still.from_start = 0.0;
     }
     const Waveforms seen =
         record_centred(wave(5 * static_cast<std::size_t>(half_period_)),
@@ -285,7 +285,7 @@ void Shaking::prepare() {
     if (seen.trip && seen.trip->fault == firmware::Fault::excitation_travel &&
         stroke_ > 0.02 * bench_.travel()) {
       stroke_ *= 0.6;
-      clearly_seen = 0.0;
+      moved_before = false;
       half_period_ = std::max(20, half_period_ * 2 / 3);
       continue;
     }
@@ -302,17 +302,15 @@ void Shaking::prepare() {
       const std::size_t first = seen.stood ? (last_change(count) / half + 1) * half : ramp_waves * half;
       const InducedVoltage induced = induced_in_waves(seen, known_, half, first, seen.samples());
       const bool turns = induced.sure(known_, current_);
-      // What a shorter wave has moved, a longer one moves too: the encoder has died or the handle is held,
-      // and a wave that is longer still would only throw it farther.
-      if (seen.stood || clearly_seen > 0.0)
-        throw_standing(bench_, known_, turns,
-                       evidence(induced) + (clearly_seen > 0.0 ? "; a shorter wave had moved it" : ""));
-      // A coarse encoder may not yet show what the voltage does: twice the stroke shows whether it is that.
-      if (turns) {
+      if (runs_on()) {
+        // What a shorter wave has moved, a longer one moves too, and what induces a voltage turns: but a
+        // detent may hold it meanwhile. Led by a field it goes no farther than that, in a longer wave it
+        // would run on.
+        if (turns || seen.stood || moved_before) require_turn_by_field(bench_, known_);
+      } else if (turns) {
+        // A coarse encoder may not yet show what the voltage does: twice the stroke shows whether it is that.
         largest_factor = 1.4;
         if (++blind == 2 || half_period_ >= longest) throw_standing(bench_, known_, true, evidence(induced));
-        // It would run on in a longer wave; led by a field it goes no farther than that.
-        if (runs_on()) require_turn_by_field(bench_, known_);
       }
       // What holds a handle that would long have swung holds it however long the wave is.
       if (!turns && half_period_ >= longest_standing) break;
@@ -321,7 +319,8 @@ void Shaking::prepare() {
     if (half_period_ >= longest) break;
     const double factor =
         seen_ > 0.0 ? std::clamp(std::sqrt(stroke_ / seen_), 0.4, largest_factor) : largest_factor;
-    clearly_seen = factor >= 1.0 && seen_ >= clear_swing * stroke_ ? seen_ : 0.0;
+    constexpr double fewest_counts = 10.0;
+    moved_before = factor >= 1.0 && seen_ >= fewest_counts * known_.count_length();
     half_period_ = std::clamp(static_cast<int>(std::lround(half_period_ * factor)), 20, longest);
   }
   if (seen_ > 0.3 * stroke_) return;
@@ -347,6 +346,8 @@ Waveforms Shaking::record(const std::vector<std::string>& channels, std::size_t 
     }
     require_no_trip(seen);
     require_living_encoder(seen, interval);
+    // The samples are sound, but the next wave would begin under an encoder that may have died.
+    if (seen.stood_afterwards) require_turn_by_field(bench_, known_);
     return seen;
   }
 }

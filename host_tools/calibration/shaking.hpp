@@ -56,10 +56,10 @@ void centre_handle(Bench& bench, const MotorKnowledge& known);
 // The wave comes up over eight of its half periods: had it its full amplitude at once, the handle would run
 // off in the first half wave's direction. The half period is found by trying: short at first, longer until
 // the handle moves by about `stroke` (m, peak to peak). Where the encoder counts nothing the induced voltage
-// decides: a motor that turns is not shaken for longer, since the same encoder would have to watch its
-// travel. Neither is one that stands after a shorter wave has moved it, nor one that would have swung by the
-// stroke if it were free, as far as its mass is known: under a dead encoder a synchronous motor of 0.6 A
-// threw a handle 222 mm with waves that grew to 150 ms.
+// decides whether a brushed motor turns. A synchronous one runs on under a dead encoder, 317 mm with waves
+// that grew to 150 ms: if its voltage says that it turns, or a shorter wave has moved it, a field leads it by
+// half an electrical turn, and without a count there nothing is shaken any more. A handle that would have
+// swung by the stroke if it were free, as far as its mass is known, is shaken for no longer either.
 //
 // Throws StepFailed: encoder_dead, motor_blocked, and what trips.
 class Shaking {
