@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include "control/edge_period_velocity.hpp"
 #include "control/foaw_velocity.hpp"
 
 namespace kmax::studies {
@@ -93,75 +94,8 @@ class IntervalTracking {
   float ahead_ = 0.0F, velocity_ = 0.0F;
 };
 
-/// The time between edges. An edge is a sample in which the handle entered a step: between two of them the
-/// steps moved and the samples passed are both whole numbers, so a slow motion has no noise. The line from
-/// the newest edge back to the last one at least n samples ago is looked at for n = 1, 2, 4 .. `longest`, and
-/// taken while it passes the edge of the line before it within one step, FOAW's band; the others are not
-/// looked at. No line goes back beyond a turn. Between edges the velocity is at most one step in the time
-/// since the last.
-///
-/// Valid: fewer than 2^17 steps in a window. A time is at most 4,096 samples, which bounds the products and
-/// the error of a handle at rest.
+/// The time between edges: the image's own.
 template <std::uint32_t longest>
-class EdgePeriod {
- public:
-  float update(std::int32_t steps) {
-    const std::uint32_t now = ++now_;
-    Edge* const edges = &ring_[head_ = (head_ - 1) & (longest_ring - 1)];
-    if (steps == 0) {
-      std::uint32_t since = now - newest_.time;
-      if (since > 4096) {
-        newest_.time += since - 4096;
-        since = 4096;
-        turn_ = newest_;
-      }
-      edges[0] = edges[longest_ring] = newest_;
-      const float most = inverse(since);
-      if (velocity_ > most) velocity_ = most;
-      if (velocity_ < -most) velocity_ = -most;
-      return velocity_;
-    }
-    const std::uint32_t down = static_cast<std::uint32_t>(steps) >> 31;
-    position_ += static_cast<std::uint32_t>(steps);
-    // Entered from below at its lower border, from above at its upper one.
-    const Edge newest{now, position_ + down};
-    // After a turn of one step nobody knows how far it went. A larger one cannot be noise.
-    if (down != down_) turn_ = static_cast<std::uint32_t>(steps + 1) <= 2 ? newest : newest_;
-    down_ = down;
-    edges[0] = edges[longest_ring] = newest_ = newest;
-    const std::uint32_t since_turn = now - turn_.time;
-    if (since_turn == 0) return velocity_ = 0.0F;
-    Line line = newest - edges[1];
-#pragma GCC unroll 4
-    for (std::uint32_t back = 2; back <= longest; back *= 2) {
-      const bool beyond = back > since_turn;
-      const Line longer = newest - (beyond ? turn_ : edges[back]);
-      const std::int32_t missed = line.steps * longer.samples - longer.steps * line.samples;
-      if (missed > longer.samples || missed < -longer.samples) break;
-      line = longer;
-      if (beyond) break;
-    }
-    return velocity_ = static_cast<float>(line.steps) / static_cast<float>(line.samples);
-  }
-
- private:
-  static constexpr std::uint32_t longest_ring = 2 * longest;
-  struct Line {
-    std::int32_t samples, steps;
-  };
-  struct Edge {
-    std::uint32_t time = 0, place = 0;  // samples, steps; modulo 2^32
-    Line operator-(const Edge& older) const {
-      return {static_cast<std::int32_t>(time - older.time), static_cast<std::int32_t>(place - older.place)};
-    }
-  };
-  static float inverse(std::uint32_t samples) {
-    return 1.0F / static_cast<float>(samples);
-  }
-  std::array<Edge, 2 * longest_ring> ring_{};  // each twice, so that the newest are contiguous
-  Edge newest_{}, turn_{};
-  std::uint32_t now_ = 0, head_ = 0, position_ = 0, down_ = 0;
-  float velocity_ = 0.0F;
-};
+using EdgePeriod = control::EdgePeriodVelocity<float, longest>;
 
 }  // namespace kmax::studies
