@@ -62,9 +62,11 @@ inline constexpr NamedValue rounding[] = {named("nearest", Rounding::nearest),
                                           named("hysteresis", Rounding::hysteresis)};
 inline constexpr NamedValue velocity_estimator[] = {
     named("difference", VelocityEstimatorKind::difference),
-    named("low_pass", VelocityEstimatorKind::low_pass), named("foaw", VelocityEstimatorKind::foaw),
+    named("low_pass", VelocityEstimatorKind::low_pass),
+    named("foaw", VelocityEstimatorKind::foaw),
     named("foaw_end_fit", VelocityEstimatorKind::foaw_end_fit),
-    named("tracking", VelocityEstimatorKind::tracking)};
+    named("tracking", VelocityEstimatorKind::tracking),
+    named("edge_period", VelocityEstimatorKind::edge_period)};
 // Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
 // ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
 inline constexpr NamedValue guard_mode[] = {{"off", 0}, {"warn", 1}, {"refuse", 2}};

@@ -103,7 +103,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
 
     choice("velocity.estimator", group::velocity, 1, names::velocity_estimator, 2,
            "Velocity estimator: finite difference, low-passed difference, first-order adaptive windowing "
-           "with the best fit or the end fit, or a tracking loop.")
+           "with the best fit or the end fit, a tracking loop, or the time between edges of the position.")
         .disarmed_only(),
     whole("velocity.window", group::velocity, 2, unsigned8, "samples", 1, 16, 16,
           "Widest window of foaw and foaw_end_fit.")

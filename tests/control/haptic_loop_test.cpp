@@ -82,9 +82,10 @@ RC_GTEST_PROP(HapticLoop, TheOtherSideIsTheMirrorImageToTheBit, ()) {
   config.wall.damping = static_cast<float>(*rc::gen::inRange(0, 10));
   config.interference.mode = *rc::gen::element(InterferenceMode::none, InterferenceMode::perpendicular);
   config.interference.force = 1.0f;
-  config.velocity.kind = *rc::gen::element(VelocityEstimatorKind::difference, VelocityEstimatorKind::low_pass,
-                                           VelocityEstimatorKind::foaw, VelocityEstimatorKind::foaw_end_fit,
-                                           VelocityEstimatorKind::tracking);
+  config.velocity.kind =
+      *rc::gen::element(VelocityEstimatorKind::difference, VelocityEstimatorKind::low_pass,
+                        VelocityEstimatorKind::foaw, VelocityEstimatorKind::foaw_end_fit,
+                        VelocityEstimatorKind::tracking, VelocityEstimatorKind::edge_period);
   config.force.limit = 3.3f;
   config.force.ramp_time = 0.01f;
   auto mirrored = config;
@@ -227,6 +228,26 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
   }
 }
 
+// A count that jumps after a long rest, as of a damaged encoder: 64 counts in a tick are 1.28 m/s.
+TEST(HapticLoop, AJumpAfterARestTripsWithEveryEstimatorThatLooksAtSingleSamples) {
+  using enum VelocityEstimatorKind;
+  for (const auto kind : {difference, foaw, foaw_end_fit, edge_period}) {
+    for (const int rest : {2, 30, 10'000}) {
+      for (const int jump : {64, -64, 100'000}) {
+        auto config = plain_wall<float>();
+        config.velocity.kind = kind;
+        config.velocity_limit = 1.0f;
+        Loop<float> loop(config);
+        loop.at(1000);
+        for (int n = 0; n < rest; ++n) ASSERT_EQ(loop.at(1001).fault, HapticFault::none);
+        const auto& out = loop.at(1001 + jump);
+        EXPECT_EQ(out.fault, HapticFault::over_speed) << static_cast<int>(kind) << " after " << rest;
+        EXPECT_EQ(out.force, 0.0f);
+      }
+    }
+  }
+}
+
 RC_GTEST_PROP(HapticLoop, AnyWalkOfCountsGivesAFiniteForceWithinTheLimit, ()) {
   auto config = plain_wall<float>();
   config.wall.kind = any_law();
@@ -235,9 +256,10 @@ RC_GTEST_PROP(HapticLoop, AnyWalkOfCountsGivesAFiniteForceWithinTheLimit, ()) {
   config.wall.magnetic_length = 1e-6f;
   config.position_resolution = *rc::gen::element(0.0, 5.5e-5, 1e-3);
   config.position_rounding = *rc::gen::element(Rounding::nearest, Rounding::floor, Rounding::hysteresis);
-  config.velocity.kind = *rc::gen::element(VelocityEstimatorKind::difference, VelocityEstimatorKind::low_pass,
-                                           VelocityEstimatorKind::foaw, VelocityEstimatorKind::foaw_end_fit,
-                                           VelocityEstimatorKind::tracking);
+  config.velocity.kind =
+      *rc::gen::element(VelocityEstimatorKind::difference, VelocityEstimatorKind::low_pass,
+                        VelocityEstimatorKind::foaw, VelocityEstimatorKind::foaw_end_fit,
+                        VelocityEstimatorKind::tracking, VelocityEstimatorKind::edge_period);
   config.force.limit = 3.3f;
   Loop<float> loop(config);
   std::int64_t count = 0;

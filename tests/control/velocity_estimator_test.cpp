@@ -15,8 +15,8 @@
 namespace kmax::control::velocity_estimator_test {
 
 using Kind = VelocityEstimatorKind;
-constexpr std::array<Kind, 5> kinds = {Kind::difference, Kind::low_pass, Kind::foaw, Kind::foaw_end_fit,
-                                       Kind::tracking};
+constexpr std::array<Kind, 6> kinds = {Kind::difference,   Kind::low_pass, Kind::foaw,
+                                       Kind::foaw_end_fit, Kind::tracking, Kind::edge_period};
 
 template <typename Scalar>
 typename VelocityEstimator<Scalar>::Coefficients prepare(Kind kind, std::int32_t step = 1) {
@@ -119,27 +119,36 @@ TEST(VelocityEstimator, WrapsOfTheCounterLeaveNoTrace) {
 
 RC_GTEST_PROP(VelocityEstimator, AChangeOfKindContinuesWithoutASpike, ()) {
   const double speed = *rc::gen::inRange(-20'000, 20'000) * 1e-3;  // counts per sample
-  std::array<VelocityEstimator<float>, 5> alone;
+  std::array<VelocityEstimator<float>, kinds.size()> alone;
   VelocityEstimator<float> estimator;
   estimator.reset(0);
   for (auto& one : alone) one.reset(0);
   Kind kind = Kind::foaw;
+  bool edges_before = false;  // within what FOAW's window reaches back to
   float last = 0.0F;
   for (int k = 1; k <= 1500; ++k) {
     const bool settled = k > 400;
     const Kind before = kind;
-    if (settled && k % 23 == 0) kind = *rc::gen::elementOf(kinds);
+    if (settled && k % 23 == 0) {
+      kind = *rc::gen::elementOf(kinds);
+      edges_before = before == Kind::edge_period;
+    }
     const auto count = static_cast<std::int64_t>(std::floor(speed * k));
     const float estimate = estimator.update(prepare<float>(kind), count);
-    std::array<float, 5> outputs{};
+    std::array<float, kinds.size()> outputs{};
     for (std::size_t i = 0; i < kinds.size(); ++i)
       outputs[i] = alone[i].update(prepare<float>(kinds[i]), count);
     if (settled && kind != before) {
+      const float difference = outputs[0];
+      const float per_count = 2e-3F;  // m/s
       if (kind == Kind::low_pass || kind == Kind::tracking) {
-        const float difference = outputs[0];
         RC_ASSERT(estimate >= std::min(last, difference) - 1e-6F);
         RC_ASSERT(estimate <= std::max(last, difference) + 1e-6F);
         RC_ASSERT(std::fabs(estimate - last) <= 0.04F * std::fabs(difference - last) + 1e-6F);
+      } else if (kind == Kind::edge_period || (kind != Kind::difference && edges_before)) {
+        // The present sample is taken into a window along the last output.
+        RC_ASSERT(estimate >= std::min(last, difference) - 0.15F * per_count);
+        RC_ASSERT(estimate <= std::max(last, difference) + 0.15F * per_count);
       } else {
         RC_ASSERT(estimate == outputs[static_cast<std::size_t>(kind)]);
       }
@@ -185,6 +194,41 @@ TEST(VelocityEstimator, AChangeOfStepInFlightIsNotTakenForMotion) {
   }
 }
 
+// The same of the edge period at any velocity and any two steps, as the resampler gives them: for a window's
+// length behind the change it is nearer to the velocity than the difference of two samples may be, and slow
+// motions keep within half to twice.
+RC_GTEST_PROP(VelocityEstimator, TheEdgePeriodGoesOnAlongItsVelocityOnAnotherStep, ()) {
+  const double speed =
+      *rc::gen::element(1.0, -1.0) * std::pow(10.0, *rc::gen::inRange(-1'000, 3'500) * 1e-3);  // counts
+  const std::int32_t first = *rc::gen::element(1, 3, 40, 128);
+  const std::int32_t second = *rc::gen::element(1, 3, 40, 128, 550);
+  // Slower ones are taken for a rest, and forgotten.
+  RC_PRE(std::abs(speed) * 2'000.0 > static_cast<double>(std::max(first, second)));
+  const auto rounding = *rc::gen::element(Rounding::nearest, Rounding::floor, Rounding::hysteresis);
+  Resampler resampler;
+  VelocityEstimator<float> estimator;
+  float held = 0.0F;
+  constexpr int change = 8'000;
+  for (int k = 0; k < change + 4'000; ++k) {
+    const std::int32_t step = k < change ? first : second;
+    const auto count = static_cast<std::int64_t>(std::floor(speed * k));
+    const auto sample = resampler.sample(Resampler::prepare({step, rounding}, count), count);
+    if (k == 0) estimator.reset(sample.count);
+    const float estimate = estimator.update(prepare<float>(Kind::edge_period, step), sample);
+    const double in_counts = static_cast<double>(estimate) / 2e-3;
+    if (k < change) {
+      held = estimate;
+      continue;
+    }
+    if (k == change && first != second) RC_ASSERT(estimate == held);
+    RC_ASSERT(in_counts * speed > 0.0);
+    // Of the first step the velocity has its own error.
+    const double usual = static_cast<double>(std::max(first, step)) / 16.0;
+    RC_ASSERT(std::abs(in_counts - speed) <=
+              std::min(static_cast<double>(step), 1.2 * std::abs(speed)) + usual);
+  }
+}
+
 // What the resampler says about the steps saves the estimator working them out: the same bits either way,
 // through changes of kind and step.
 RC_GTEST_PROP(VelocityEstimator, TheResamplersStepsChangeNothing, ()) {
@@ -221,7 +265,9 @@ TEST(VelocityEstimator, ResetMeansStandingStill) {
     estimator.reset(5);
     EXPECT_EQ(estimator.update(prepare<float>(kind), 5), 0.0F) << static_cast<int>(kind);
     estimator.reset(5);
-    EXPECT_GT(estimator.update(prepare<float>(kind), 6), 0.0F) << static_cast<int>(kind);
+    // To the edge period a first step from rest may be noise.
+    const std::int64_t moved = kind == Kind::edge_period ? 7 : 6;
+    EXPECT_GT(estimator.update(prepare<float>(kind), moved), 0.0F) << static_cast<int>(kind);
   }
 }
 
@@ -250,7 +296,7 @@ RC_GTEST_PROP(VelocityEstimator, EveryOutputIsFinite, (const std::vector<std::in
 TEST(VelocityEstimator, NumbersOfTheKindsStay) {
   using enum VelocityEstimatorKind;
   int number = 0;
-  for (const VelocityEstimatorKind one : {difference, low_pass, foaw, foaw_end_fit, tracking})
+  for (const VelocityEstimatorKind one : {difference, low_pass, foaw, foaw_end_fit, tracking, edge_period})
     EXPECT_EQ(static_cast<int>(one), number++);
 }
 

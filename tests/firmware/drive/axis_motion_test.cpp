@@ -243,7 +243,7 @@ TEST_F(AxisMotion, AWrongCommutationIsCaughtAsASpinOut) {
 TEST_F(AxisMotion, NeitherTheHapticRateNorTheEstimatorLooksLikeASpinOut) {
   using enum control::VelocityEstimatorKind;
   for (const std::uint32_t divider : {1U, 4U, 40U}) {
-    for (const auto kind : {difference, low_pass, foaw, tracking}) {
+    for (const auto kind : {difference, low_pass, foaw, tracking, edge_period}) {
       for (const float stiffness : {300.0f, 1000.0f, 3000.0f}) {
         for (const double hand : {-1.0, -4.9}) {
           MovingHandle handle(MotorKind::dc);

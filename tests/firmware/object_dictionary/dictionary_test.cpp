@@ -57,7 +57,7 @@ const std::vector<Word> vocabulary = {
     {"interference.onset_time", "s"},
     {"position.resolution", "m"},
     {"position.rounding", "", {"nearest", "floor", "hysteresis"}},
-    {"velocity.estimator", "", {"difference", "low_pass", "foaw", "tracking"}},
+    {"velocity.estimator", "", {"difference", "low_pass", "foaw", "tracking", "edge_period"}},
     {"velocity.window", "samples"},
     {"velocity.bandwidth", "Hz"},
     {"haptic.rate", "Hz"},

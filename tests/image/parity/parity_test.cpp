@@ -151,7 +151,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       write("interference.force", axis, real(world.uniform(-1, 5)));
       write("interference.background_force", axis, real(world.uniform(-1, 4)));
       write("interference.onset_time", axis, real(world.uniform(0, 0.002)));
-      write("velocity.estimator", axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
+      write("velocity.estimator", axis, static_cast<std::uint32_t>(world.uniform(0, 6)));
       write("velocity.window", axis, static_cast<std::uint32_t>(world.uniform(1, 17)));
       write("velocity.limit", axis, real(0.0));
       write("position.resolution", axis, real(world.uniform(0, 2e-4)));
