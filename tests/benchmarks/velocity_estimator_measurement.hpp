@@ -74,12 +74,13 @@ struct Row {
 };
 
 inline constexpr std::array<Signal, 3> signals = {{{"slow ramp", ramp}, {"sine", sine}, {"impact", impact}}};
-inline constexpr std::array<Estimator, 5> estimators = {
+inline constexpr std::array<Estimator, 6> estimators = {
     {{"difference", VelocityEstimatorKind::difference, "#000000"},
      {"low pass", VelocityEstimatorKind::low_pass, "#E69F00"},
      {"FOAW best-fit", VelocityEstimatorKind::foaw, "#0072B2"},
      {"FOAW end-fit", VelocityEstimatorKind::foaw_end_fit, "#56B4E9"},
-     {"tracking", VelocityEstimatorKind::tracking, "#D55E00"}}};
+     {"tracking", VelocityEstimatorKind::tracking, "#D55E00"},
+     {"edge period", VelocityEstimatorKind::edge_period, "#CC79A7"}}};
 inline constexpr std::array<double, 2> quanta = {55e-6, 1e-6};
 inline constexpr std::array<double, 2> rates = {500.0, 20'000.0};
 

@@ -239,9 +239,8 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
              "and {:.2f} of its error at 20 kHz, {:.2f} at 2 kHz and {:.2f} at 500 Hz. In {} of {} cases it "
              "has less error, or at most a tenth more; slow motions at high rates gain most, and single "
              "samples of impacts are further off. As far as the last table can show, a damped wall may be "
-             "as stiff or stiffer at 2 kHz and above, and not quite as stiff at 500 Hz. It is not in the "
-             "image: it still needs a start at a given velocity, for a change of estimator or resolution in "
-             "flight; FOAW stays the reference.",
+             "as stiff or stiffer at 2 kHz and above, and not quite as stiff at 500 Hz. It is in the image: "
+             "velocity.estimator edge_period. FOAW stays the default and the reference.",
              worst_of(edge_period), worst_of(0), at(20e3), at(2e3), at(500.0), as_good, cases.size())},
         {summary, errors},
         {}},

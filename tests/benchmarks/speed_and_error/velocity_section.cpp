@@ -14,7 +14,7 @@ report::Section velocity_section(const std::filesystem::path& pictures) {
   report::Section section;
   section.heading = "Velocity estimators";
   section.paragraphs = {fmt::format(
-      "Compared: the five estimators of control/velocity_estimator.hpp in float, one update per sample, FOAW "
+      "Compared: the six estimators of control/velocity_estimator.hpp in float, one update per sample, FOAW "
       "with a window of {} intervals, low pass and tracking at {:g} Hz. Against: the analytic velocity of "
       "the motion at the sampling instant, so the error contains noise and delay. Motions of 4 s: a ramp of "
       "{:g} mm/s, a sine of {:g} mm at {:g} Hz, and a mass of {:g} g that bounces at {:g} mm/s between two "

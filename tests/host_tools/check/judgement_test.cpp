@@ -131,7 +131,7 @@ TEST(Judgement, TheRegionCountsTheDelay) {
 TEST(Judgement, ADamperOfAnotherEstimatorIsNotGuaranteed) {
   ParameterValues values = good();
   values.set_real<"wall.damping">(0.5f);
-  for (std::uint32_t estimator = 0; estimator < 5; ++estimator) {
+  for (std::uint32_t estimator = 0; estimator < 6; ++estimator) {
     values.set_whole<"velocity.estimator">(estimator);
     const Judgement judgement = judge_parameters(values, 0, {});
     EXPECT_TRUE(judgement.pass) << estimator;
