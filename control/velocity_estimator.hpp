@@ -35,7 +35,7 @@ struct VelocityEstimatorConfig {
 //
 // A change of kind between samples gives no spike, because the new estimator does not start from nothing:
 //   - difference, foaw and foaw_end_fit give exactly what they would have given had they always been
-//     selected: their state is the history;
+//     selected, unless edge_period ran before: their state is the history;
 //   - low_pass and tracking start on the previous sample with the last output as their velocity;
 //   - edge_period starts there as well, with a history laid out along that velocity, and so do foaw and
 //     foaw_end_fit after it.

@@ -90,14 +90,14 @@ void FieldSweep::align(double reach) {
   require_no_trip(bench_.record(vector, {{"count"}, 10, 10, alignment_time}, reach));
 }
 
-void FieldSweep::prepare() {
+void FieldSweep::require_half_turn() {
   bench_.progress("field: letting the rotor fall in");
   angle_ = 0.0;
   align();
   const double before = bench_.displacement();
   const double half_turn = std::numbers::pi;
   const Waveforms to = turn(half_turn, {"count", "voltage_d"}, 600);
-  double after = bench_.displacement();
+  const double after = bench_.displacement();
   const double counts = std::abs(after - before) / known_.count_length();
   // An encoder that died on the way would make the way of a radian of the field too short, and what is turned
   // by it far too long: a handle was led 217 mm away.
@@ -109,10 +109,15 @@ void FieldSweep::prepare() {
     const Waveforms fro = turn(-half_turn, {"count", "voltage_d"}, 600);
     diagnose_still(at_last, to, fro);
   }
-  const double per_radian = (after - before) / half_turn;  // m
-  metres_per_radian_ = per_radian;
+  metres_per_radian_ = (after - before) / half_turn;
   known_angle_ = angle_;
   known_displacement_ = after;
+}
+
+void FieldSweep::prepare() {
+  require_half_turn();
+  const double per_radian = metres_per_radian_;
+  double after = known_displacement_;
   // The travel counts from where the axis is armed: with the handle in the middle all of it can be used.
   turn(-after / per_radian, {"count"}, 100);
   bench_.disarm();

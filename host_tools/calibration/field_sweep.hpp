@@ -20,6 +20,9 @@ class FieldSweep {
 
   FieldSweep(Bench& bench, const MotorKnowledge& known) : bench_(bench), known_(known) {}
 
+  // Half an electrical turn. Throws StepFailed if the encoder does not see it: encoder_dead, motor_blocked.
+  void require_half_turn();
+  // That, then to the middle of the travel and to where a sweep begins.
   void prepare();
   // One sweep: channels `electrical_angle`, `count` and `voltage_d`. Forwards and backwards must take turns,
   // forwards first.

@@ -109,7 +109,8 @@ namespace {
 // Of a synchronous motor, half an electrical turn. Throws StepFailed if the encoder does not see it.
 void require_turn_by_field(Bench& bench, const MotorKnowledge& known) {
   bench.disarm();
-  FieldSweep(bench, known).prepare();
+  FieldSweep(bench, known).require_half_turn();
+  bench.disarm();
 }
 }  // namespace
 
@@ -292,6 +293,7 @@ void Shaking::prepare() {
     require_no_trip(seen);
     if (seen.empty())
       throw_standing(bench_, known_, false, "the encoder of the shaken handle counts nothing");
+    if (seen.stood_afterwards) require_turn_by_field(bench_, known_);
     const auto count = seen.of("count");
     const auto moving = count.last(count.size() * 4 / (ramp_waves + 6));
     seen_ = bench::span_of(moving) * known_.count_length();

@@ -15,7 +15,7 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "A rigid device of mass m and damping b, a spring and damper wall whose damper uses the difference of "
      "two positions, a zero-order hold. The hand may be anything passive; friction, quantization and the "
      "hand's own damping are not counted on, so most walls in use fail it and are still. A damper by "
-     "low_pass is covered too, by foaw, tracking or edge_period not. The delay is added to half a period to "
+     "low_pass is covered too, one by any other estimator is not. The delay is added to half a period to "
      "first order; a b that is only measured at low speed may be smaller at the rate of the loop.",
      "",
      "J. E. Colgate and G. G. Schenkel, Passivity of a class of sampled-data systems: application to haptic "

@@ -112,8 +112,9 @@ std::vector<Baseline> law_baselines() {
   for (const double damping : {4.0, 8.0, 12.0, 16.0})
     add("damping, difference",
         {{fmt::format("damping {:g} N s/m, difference", damping), damped(damping, difference)}});
-  for (const auto estimator : {VelocityEstimatorKind::low_pass, VelocityEstimatorKind::foaw,
-                               VelocityEstimatorKind::foaw_end_fit, VelocityEstimatorKind::tracking})
+  for (const auto estimator :
+       {VelocityEstimatorKind::low_pass, VelocityEstimatorKind::foaw, VelocityEstimatorKind::foaw_end_fit,
+        VelocityEstimatorKind::tracking, VelocityEstimatorKind::edge_period})
     add("damping, other estimators",
         {{fmt::format("damping 8 N s/m, {}", estimator_name(estimator)), damped(8.0, estimator)}});
   add("field and damping",

@@ -104,8 +104,8 @@ using experiment::estimator_name;
 using experiment::felt_force;
 inline constexpr std::array all_estimators{
     control::VelocityEstimatorKind::difference, control::VelocityEstimatorKind::low_pass,
-    control::VelocityEstimatorKind::foaw, control::VelocityEstimatorKind::foaw_end_fit,
-    control::VelocityEstimatorKind::tracking};
+    control::VelocityEstimatorKind::foaw,       control::VelocityEstimatorKind::foaw_end_fit,
+    control::VelocityEstimatorKind::tracking,   control::VelocityEstimatorKind::edge_period};
 
 // --- Sweeps over walls (sweep.cpp) ------------------------------------------------------------------------
 

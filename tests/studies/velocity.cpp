@@ -223,10 +223,9 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
       "Velocity estimators: error against cost",
       {{"Cheaper than FOAW",
         {"Tried against FOAW with the best fit and 16 intervals; tests/studies/velocity_candidates.hpp "
-         "says how each "
-         "works. Instructions of one sample on the Cortex-M4, history included, counted over motions of "
-         "every kind; "
-         "a division is one of them and takes 14 cycles. Means over the " +
+         "says how each works. Instructions of one sample on the Cortex-M4, history included, "
+         "counted over motions of every kind; a division is one of them and takes 14 cycles. Means over "
+         "the " +
              std::to_string(cases.size()) + " cases below are geometric.",
          fmt::format(
              "No incremental form of FOAW gives its results: all its lines begin at the newest sample, so "
@@ -237,10 +236,10 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
          fmt::format(
              "The winner is the edge period over 16 samples: {} instructions at worst where FOAW takes {}, "
              "and {:.2f} of its error at 20 kHz, {:.2f} at 2 kHz and {:.2f} at 500 Hz. In {} of {} cases it "
-             "has less error, or at most a tenth more; slow motions at high rates gain most, and single "
-             "samples of impacts are further off. As far as the last table can show, a damped wall may be "
-             "as stiff or stiffer at 2 kHz and above, and not quite as stiff at 500 Hz. It is in the image: "
-             "velocity.estimator edge_period. FOAW stays the default and the reference.",
+             "has less error, or at most a tenth more. Coarse counts at high rates gain most; a slow ramp "
+             "on fine counts at a low rate loses most. It reads 0 below one step in 4096 samples, and where "
+             "the count goes to and fro by one. It is in the image: velocity.estimator edge_period. FOAW "
+             "stays the default and the reference.",
              worst_of(edge_period), worst_of(0), at(20e3), at(2e3), at(500.0), as_good, cases.size())},
         {summary, errors},
         {}},

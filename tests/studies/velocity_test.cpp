@@ -19,7 +19,9 @@ TEST(VelocityStudy, TheEdgePeriodIsRightWhereFoawIsNoisyAndAsGoodInImpacts) {
     const double error = one.errors[edge_period].rms, foaw = one.errors[0].rms;
     SCOPED_TRACE(one.motion + ", " + std::to_string(one.quantum) + ", " + std::to_string(one.rate));
     const bool slow_on_coarse = one.quantum == 55e-6 && one.rate == 20e3 && one.motion[0] != 'i';
-    EXPECT_LT(error, slow_on_coarse ? foaw / 10.0 : 1.25 * foaw + 1.2e-3);
+    // Where neither is off by more than a fraction of what one count in a sample is, nobody feels which it
+    // is.
+    EXPECT_LT(error, slow_on_coarse ? foaw / 10.0 : 1.25 * foaw + 0.05 * one.quantum * one.rate);
   }
 }
 
