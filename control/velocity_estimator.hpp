@@ -134,7 +134,7 @@ class VelocityEstimator {
   static constexpr std::uint32_t step_bits = 0x3FFFFFFFU;
   static constexpr std::uint32_t no_key = 0xFFFFFFFFU;
 
-  // The three kinds that work on FOAW's history share a state. Steps up to 2^30 - 1 are told apart; no step
+  // The three kinds that work on FOAW's history share a state. Steps up to 2^30 - 1 all differ in it; no step
   // of any kind makes no_key.
   static constexpr std::uint32_t key_of(VelocityEstimatorKind kind, std::int32_t step) {
     const std::uint32_t state = kind == VelocityEstimatorKind::low_pass      ? 1U

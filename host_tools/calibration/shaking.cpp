@@ -99,13 +99,7 @@ std::size_t last_change(std::span<const double> count) {
     if (count[k - 1] != count[k - 2]) return k - 1;
   return 0;
 }
-}  // namespace
 
-bool stands(std::span<const double> count) {
-  return bench::span_of(count) < 2.0;
-}
-
-namespace {
 // Of a synchronous motor, half an electrical turn. Throws StepFailed if the encoder does not see it.
 void require_turn_by_field(Bench& bench, const MotorKnowledge& known) {
   bench.disarm();
@@ -113,6 +107,10 @@ void require_turn_by_field(Bench& bench, const MotorKnowledge& known) {
   bench.disarm();
 }
 }  // namespace
+
+bool stands(std::span<const double> count) {
+  return bench::span_of(count) < 2.0;
+}
 
 void throw_standing(Bench& bench, const MotorKnowledge& known, bool induced, const std::string& evidence) {
   // A synchronous motor whose field stands still has come to rest in it. Dragged along by a field that turns

@@ -228,7 +228,7 @@ TEST(EdgePeriodVelocity, AStartAtAVelocityGivesItFromTheFirstSampleOn) {
   }
 }
 
-// Where in its step the handle is, the start is not told: a slow one is then off by no more than half to
+// Where in its step the handle is, a start does not know: a slow one is then off by no more than half to
 // twice, a fast one by no more than the difference of two samples is.
 RC_GTEST_PROP(EdgePeriodVelocity, AStartBetweenTwoStepsMakesNoSpike, ()) {
   const double size = std::pow(10.0, *rc::gen::inRange(-3'300, 3'000) * 1e-3);
