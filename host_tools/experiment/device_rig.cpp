@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <initializer_list>
+#include <string_view>
 
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/value_text.hpp"
@@ -15,18 +16,32 @@
 namespace kmax::experiment {
 
 namespace {
-/// What no experiment varies. The defaults are paper 1's constants, and no damping.
-constexpr std::array papers_constants{"wall.damping",
-                                      "interference.onset_time",
-                                      "wall.magnetic_length",
-                                      "wall.adaptive_gain",
-                                      "wall.adaptive_offset",
-                                      "wall.adaptive_velocity_max",
-                                      "wall.adaptive_relation",
-                                      "wall.adaptive_velocity",
-                                      "wall.adaptive_force_min",
-                                      "wall.adaptive_force_max",
-                                      "wall.adaptive_hold_time"};
+/// The device's own in each experiment: where its surface is, and what a person has allowed at most.
+constexpr std::array kept{"wall.position", "wall.side", "wall.stiffness_ceiling", "wall.damping_ceiling"};
+
+bool sets(const std::vector<std::string>& assignments, std::string_view name) {
+  return std::any_of(assignments.begin(), assignments.end(), [&](const std::string& one) {
+    return one.starts_with(name) && one.substr(name.size()).starts_with('=');
+  });
+}
+
+bool is_in_group(const device::Parameter& parameter, std::string_view group) {
+  return std::string_view(parameter.definition().name).starts_with(group);
+}
+
+/// Settings of the wall and the interference that `assignments` leaves open. The defaults are paper 1's
+/// constants, no damping and no growth.
+std::vector<device::Parameter> left_open(const std::vector<std::string>& assignments) {
+  std::vector<device::Parameter> all;
+  for (const device::Parameter& parameter : device::all_parameters()) {
+    const std::string_view name = parameter.definition().name;
+    const bool of_wall = is_in_group(parameter, "wall.") || is_in_group(parameter, "interference.");
+    const bool is_kept = std::find(kept.begin(), kept.end(), name) != kept.end();
+    if (of_wall && parameter.axis() == 0 && parameter.writable() && !is_kept && !sets(assignments, name))
+      all.push_back(parameter);
+  }
+  return all;
+}
 
 /// The wall's last, as TouchWatch has them.
 std::vector<std::size_t> axes_of(const TouchLimits& limits, RigAxes axes) {
@@ -68,10 +83,8 @@ std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis,
     add({choice(device::Parameter::of<"wall.law">(), wall.law),
          fmt::format("wall.magnetic_coefficient={}", wall.magnetic_coefficient),
          choice(device::Parameter::of<"wall.adaptive_mode">(), wall.mode)});
-    for (const char* name : papers_constants) {
-      const device::Parameter parameter = device::resolve(name);
+    for (const device::Parameter& parameter : left_open(all))
       all.push_back(text(parameter, parameter.default_raw()));
-    }
   }
   for (const std::string& change : wall.changes) {
     const std::string name = change.substr(0, change.find('=') + 1);
@@ -207,10 +220,17 @@ RigTouch DeviceRig::hold(const TouchPlan& plan) {
 
 RunJournal::Json device_circumstances(device::Device& device, std::size_t axis) {
   RunJournal::Json all = {{"device", device.identify()}, {"axis", axis}};
-  for (const char* name : {"velocity.estimator", "force.slew_limit", "force.ramp_time", "device.transmission",
-                           "encoder.counts_per_turn"}) {
-    const device::Parameter parameter = device::resolve(name, axis);
-    all[name] = device::value_text(parameter, device.read(parameter));
+  const auto note = [&](const device::Parameter& parameter) {
+    all[parameter.definition().name] = device::value_text(parameter, device.read(parameter));
+  };
+  for (const char* name :
+       {"force.slew_limit", "force.ramp_time", "device.transmission", "encoder.counts_per_turn"})
+    note(device::resolve(name, axis));
+  for (const char* name : kept) note(device::resolve(name, axis));
+  for (const device::Parameter& parameter : device::all_parameters()) {
+    if (!parameter.writable() || !parameter.belongs_to_axis() || parameter.axis() != axis) continue;
+    for (const std::string_view group : {"velocity.", "instability.", "compensation."})
+      if (is_in_group(parameter, group)) note(parameter);
   }
   return all;
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
+#include <string>
 
 #include "host_tools/base/errors.hpp"
 #include "host_tools/experiment/device_rig.hpp"
@@ -148,6 +150,22 @@ TEST(TouchChanges, ALawIsChangedOnlyWhereTheExperimentDoesNotVaryIt) {
                                  Varied::stiffness_and_speeds);
                   }),
                   "several speeds");
+}
+
+// What somebody saved on a device must not be part of a paper's wall.
+TEST(WallAssignments, LeaveNoSettingOfTheWallToTheDevice) {
+  const Texts all = wall_assignments({}, 0, RigAxes::wall);
+  const std::set<std::string> of_the_device{"wall.position", "wall.side", "wall.stiffness_ceiling",
+                                            "wall.damping_ceiling"};
+  for (const device::Parameter& parameter : device::all_parameters()) {
+    const std::string name = parameter.name();
+    if (!name.starts_with("wall.") && !name.starts_with("interference.")) continue;
+    if (!parameter.writable() || of_the_device.contains(name)) continue;
+    EXPECT_EQ(std::count_if(all.begin(), all.end(),
+                            [&](const std::string& one) { return one.starts_with(name + "="); }),
+              1)
+        << name;
+  }
 }
 
 }  // namespace kmax::experiment::touch_changes_test
