@@ -24,6 +24,10 @@ struct GrowingStiffnessConfig {
 /// costs: docs/experiments/max_stiffness.md. At the moment of contact the wall is no harder than K_touch,
 /// and that is what a tap feels.
 ///
+/// A wall that looks stable may be one that never comes to K: where each count that the encoder goes on is
+/// not calm, it stays near the stiffness at which the handle would begin to oscillate. present() says what
+/// it renders.
+///
 /// A lower K, or a higher K_touch, counts at once. Of a velocity that is no number the contact is not calm.
 /// What is missing decays by a factor, so that growth never stalls by rounding. Cost on a Cortex-M4F:
 /// 4 instructions where nothing grows.
@@ -55,6 +59,9 @@ class GrowingStiffness {
 
   /// A sample outside, or a new start.
   void leave() { met_ = false; }
+
+  /// N/m, 0 to K: after the last sample inside; K where nothing grows. No tick asks for it.
+  Scalar present(const Coefficients& c) const { return c.grows ? c.full - missing_ : c.full; }
 
   /// N/m, 0 to K, for a sample inside. `velocity`: m/s, of the handle.
   Scalar inside(const Coefficients& c, Scalar velocity) {

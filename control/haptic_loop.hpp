@@ -186,6 +186,10 @@ class HapticLoop {
     return softening_.factor() * (held_.magnetic_force + interference_.background(c.interference));
   }
 
+  /// N/m: what the wall's spring has come to, before softening; its stiffness unless that grows. For a
+  /// simulation; no board asks for it.
+  Scalar present_stiffness(const Coefficients& c) const { return wall_.present_stiffness(c.wall); }
+
   /// 0 to 1: the factor on all of the wall's force; 1 while not enabled.
   Scalar softening() const { return softening_.factor(); }
 

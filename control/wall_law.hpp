@@ -127,6 +127,9 @@ class WallLaw {
     return {force, coefficient, coefficient, true};
   }
 
+  /// N/m, of the spring after the last sample inside, see GrowingStiffness::present().
+  Scalar present_stiffness(const Coefficients& c) const { return stiffness_.present(c.stiffness); }
+
  private:
   static constexpr Scalar largest = std::numeric_limits<Scalar>::max();
 

@@ -73,6 +73,20 @@ class WindowJudge {
   bool touched_ = false, still_ = false;
 };
 
+/// What a wall that grows has come to at the end of the judged window.
+class RenderedShare {
+ public:
+  void take(double share) {
+    sum_ += share;
+    ++samples_;
+  }
+  double mean() const { return samples_ > 0 ? sum_ / static_cast<double>(samples_) : 0.0; }
+
+ private:
+  double sum_ = 0.0;
+  std::uint64_t samples_ = 0;
+};
+
 void require(const TouchSetup& setup, std::span<const TouchJudgement> judgements) {
   const double rate = setup.wall.tick_rate;
   if (setup.wall.divider != 1 || !(rate >= 10.0 && rate <= 1e6))
@@ -86,6 +100,10 @@ void require(const TouchSetup& setup, std::span<const TouchJudgement> judgements
   if (setup.window * rate < 8.0)
     throw std::invalid_argument(fmt::format(
         "judged window of {} s holds fewer than 8 samples at {} Hz: judge longer", setup.window, rate));
+  if (!(setup.least_rendered_share >= 0.0 && setup.least_rendered_share <= 1.0))
+    throw std::invalid_argument(
+        fmt::format("share of the stiffness that a wall must come to, {}: allowed is 0 to 1",
+                    setup.least_rendered_share));
   for (const TouchJudgement& judgement : judgements) {
     if (!(judgement.threshold > 0.0))
       throw std::invalid_argument(fmt::format("threshold of {} {} peak to peak: it must be above 0",
@@ -144,12 +162,18 @@ std::vector<TouchOutcome> run_touch(const TouchSetup& setup, std::span<const Tou
   TouchOutcome touch;  // without a verdict
   const double period = 1.0 / setup.wall.tick_rate;
   std::uint64_t saturated = 0, since_contact = 0;
+  const bool grows = coefficients.wall.stiffness.grows;
+  RenderedShare rendered;
   std::vector<WindowJudge> judges;
   std::vector<std::optional<TouchOutcome>> outcomes(judgements.size());
   const auto finish = [&](std::size_t n) {
     touch.event_limit_hits = handle.event_limit_hits();
     if (since_contact > 0)
       touch.saturated_share = static_cast<double>(saturated) / static_cast<double>(since_contact);
+    if (grows) {
+      touch.rendered_share = rendered.mean();
+      touch.rendered = touch.rendered_share >= setup.least_rendered_share;
+    }
     outcomes[n] = touch;
     judges[n].finish(*outcomes[n]);
   };
@@ -173,11 +197,16 @@ std::vector<TouchOutcome> run_touch(const TouchSetup& setup, std::span<const Tou
       touch.coefficient_at_contact = static_cast<double>(out.magnetic_coefficient);
     }
     const auto force = static_cast<double>(out.force);
-    bool all_certain = !judges.empty();
+    if (grows && out.inside && time >= end - 0.25 * setup.window)
+      rendered.take(static_cast<double>(loop.present_stiffness(coefficients)) /
+                    static_cast<double>(setup.wall.wall.stiffness));
+    // What a wall that grows comes to is known at the end.
+    const bool open = grows && setup.least_rendered_share > 0.0;
+    bool all_certain = !judges.empty() && !open;
     for (std::size_t n = 0; n < judges.size(); ++n) {
       if (outcomes[n]) continue;
       judges[n].take(time, position, force);
-      if (!judges[n].certain()) {
+      if (open || !judges[n].certain()) {
         all_certain = false;
       } else if (until == Until::each_is_certain) {
         finish(n);
@@ -216,7 +245,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   if (by_force) judgements.push_back(swings);
   const std::vector<TouchOutcome> outcomes = run_touch(
       setup, judgements, recording != nullptr ? Until::end_of_hold : Until::all_are_certain, recording);
-  return outcomes.front().unstable() ? outcomes.front() : outcomes.back();
+  return outcomes.front().held() ? outcomes.back() : outcomes.front();
 }
 
 std::vector<TouchOutcome> judge_touch(const TouchSetup& setup, std::span<const TouchJudgement> judgements) {

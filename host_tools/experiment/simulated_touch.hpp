@@ -64,6 +64,10 @@ struct TouchSetup {
   double force_threshold = 0.0;
   // With a force threshold: the position is judged as well, and a touch is unstable by either.
   bool judges_both = false;
+  // Of wall.stiffness, mean over the samples inside in the window's last quarter: a wall that grows and comes
+  // to less is not held, however still the handle. People distinguish stiffnesses that are 8 to 23 % apart
+  // (Jones and Hunter 1990; Tan, Durlach, Beauregard, Srinivasan 1995). 0: it is not asked for.
+  double least_rendered_share = 0.95;
   // Makes what is added in one touch, which begins without a memory. None: nothing is.
   std::function<AddedForce(const TouchSetup&)> added_force{};
 };
@@ -83,12 +87,16 @@ struct TouchOutcome {
   double peak_to_peak = 0.0;            // m (N by the force), over what was simulated of the window
   bool by_force = false;                // the criterion that peak_to_peak and verdict are of
   double deepest = 0.0;                 // m, in it
+  double rendered_share = 1.0;          // see TouchSetup; 0 if the handle was not inside then
+  bool rendered = true;                 // the share is as large as the setup asks for
   double saturated_share = 0.0;         // of the samples since the first contact: force limited or clipped
   double contact_speed = 0.0;           // m/s, true, towards the wall at the first sample inside
   double coefficient_at_contact = 0.0;  // N, F_MC there
   std::uint64_t samples = 0;            // haptic samples simulated
   std::uint64_t event_limit_hits = 0;   // coupled_handle.hpp; 0 unless a friction event could not be resolved
   bool unstable() const { return verdict == simulation::ContactVerdict::unstable; }
+  // Neither does it oscillate, nor has it stayed softer than it was set.
+  bool held() const { return !unstable() && rendered; }
 };
 
 // `recording`: every sample is appended, and the touch is simulated to the end of its hold. Throws

@@ -91,15 +91,9 @@ class ReadGrowth {
  private:
   double least() const { return std::min(reading_.touch_stiffness, full_); }
   void grow() {
-    if (reading_.rate > 0.0) {
-      grown_ = std::min(full_, grown_ + reading_.rate * period_);
-    } else if (reading_.by_itself) {
-      grown_ = std::min(full_, grown_ * (1.0 + period_ / reading_.growth_time));
-    } else if (reading_.linear) {
-      grown_ = std::min(full_, grown_ + (full_ - least()) * period_ / reading_.growth_time);
-    } else {
-      grown_ = full_ - (full_ - grown_) * reading_.growth_time / (reading_.growth_time + period_);
-    }
+    grown_ = reading_.by_itself
+                 ? std::min(full_, grown_ * (1.0 + period_ / reading_.growth_time))
+                 : full_ - (full_ - grown_) * reading_.growth_time / (reading_.growth_time + period_);
   }
 
   GrowthReading reading_;
@@ -139,6 +133,8 @@ WallChange growth_read(const GrowthReading& reading) {
   return [reading](TouchSetup& setup) {
     setup.wall.wall.damping = static_cast<float>(reading.damping);
     setup.wall.damping_window = 1;
+    setup.wall.velocity = {.kind = reading.calm_by};
+    setup.least_rendered_share = 0.0;
     setup.added_force = made_of<ReadGrowth>(reading);
   };
 }
@@ -197,11 +193,6 @@ std::vector<std::string> factor_words(const AuditComparison& comparison) {
   say("An account that is kept outside, where ours forgets it at the surface though a field reaches further, "
       "takes",
       "keeps its account outside", {"field of 2 N, against the spring's energy"});
-  say("A wall that keeps what it has grown while the handle moves, where ours takes it back four times as "
-      "fast as it "
-      "came, takes",
-      "keeps what has grown while not calm",
-      {"grows from 2 N/mm in 0.2 s", "grows from 3 N/mm in 0.2 s, damping 6 N s/m"});
   return words;
 }
 
@@ -278,15 +269,15 @@ std::vector<LawReading> law_readings() {
     reading.damping = 6.0;
     readings.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m", what, growth_read(reading)});
   };
-  growth("as ours, written again", {});
-  growth("calm up to 0.05 m/s, a count a sample", {.calm = 0.05});
-  growth("keeps what has grown while not calm", {.falls = 0.0});
-  growth("keeps it, calm up to 0.05 m/s", {.calm = 0.05, .falls = 0.0});
-  growth("keeps it, grows in equal steps", {.linear = true, .falls = 0.0});
-  growth("keeps it, grows by a share of itself", {.falls = 0.0, .by_itself = true});
-  growth("keeps it, grows by 20 N/mm a second", {.falls = 0.0, .rate = 20e3});
-  growth("keeps it, grows by 25 N/mm a second", {.falls = 0.0, .rate = 25e3});
-  growth("loses it at once while not calm", {.falls = 1e9});
+  const auto difference = control::VelocityEstimatorKind::difference;
+  growth("may stay softer than it is set", {});
+  growth("the same, keeps what has grown while not calm", {.falls = 0.0});
+  growth("the same, keeps it, grows by a share of itself", {.falls = 0.0, .by_itself = true});
+  growth("the same, calm by the difference of one sample", {.calm_by = difference});
+  growth("the same, calm by the difference, up to 0.05 m/s", {.calm = 0.05, .calm_by = difference});
+  growth("the same, calm by the difference, keeps it", {.falls = 0.0, .calm_by = difference});
+  growth("the same, calm by the difference, keeps it, grows by a share of itself",
+         {.falls = 0.0, .by_itself = true, .calm_by = difference});
   return readings;
 }
 
@@ -369,6 +360,10 @@ report::Section audit_section(const AuditComparison& comparison) {
       "The last column names the nearest of several readings, which shows that the audit's number can be had "
       "and not that the audit's law was that one.");
   for (std::string& words : factor_words(comparison)) section.paragraphs.push_back(std::move(words));
+  section.paragraphs.emplace_back(
+      "Ours that grow count as held only if they come to 95 % of their stiffness. Nothing says that the "
+      "audit asked "
+      "for that, so all of their readings may stay softer.");
   return section;
 }
 

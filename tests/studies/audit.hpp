@@ -57,11 +57,11 @@ WallChange passivity_read(const PassivityReading& reading);
 struct GrowthReading {
   double touch_stiffness = 2000.0, growth_time = 0.2, damping = 0.0;  ///< N/m, s, N s/m
   double calm = 0.01;                                                 ///< m/s
-  bool linear = false;     ///< in equal steps, all of it in growth_time, else exponentially
   double falls = 4.0;      ///< so much faster than it grows while not calm; 0: it keeps what it has
-  double rate = 0.0;       ///< N/m per s, instead of a share of K in a time
   bool by_itself = false;  ///< by a share of what it is, e-fold in growth_time, else of what is missing
+  control::VelocityEstimatorKind calm_by = control::VelocityEstimatorKind::foaw;
 };
+/// It counts as held wherever it is stable, also where it stays softer than it was set.
 WallChange growth_read(const GrowthReading& reading);
 
 /// A damper over one sample which the wall may pull the handle in with: the firmware's does not.

@@ -281,7 +281,12 @@ report::Section baseline_section(const SubjectSet& set, const std::vector<Baseli
       fmt::format(
           "Peak force is the most that wall and field push with until the end of the hold; the work over the "
           "touch is what the hand has put in against them by then: stored in the spring, or taken by a "
-          "damper. Below 0 an oscillating wall has given more than it took; the plain wall allows {} N/mm.",
+          "damper. Below 0 an oscillating wall has given more than it took; the plain wall allows {} N/mm. "
+          "Rate-hardness (Lawrence, Pao, Dougherty, Salada, Pavlou 2000) is how fast the force rises in the "
+          "first "
+          "4 ms after the contact, for each m/s of the handle's speed there; below 0 a damper or field has "
+          "pushed "
+          "more at the contact than the wall does 4 ms later.",
           n_per_mm(results.front().moves.mean)),
       fmt::format(
           "Damping of 8 N s/m without any field allows {} N/mm, the paper's 2 N field {}; by the force that "

@@ -125,7 +125,8 @@ report::Section rate_section(const std::vector<RateResult>& results) {
   section.paragraphs.push_back(
       "One person, force not clipped, steps of 3 %. Unstable is what moves by more than three counts of the "
       "encoder peak to peak in the first table of each encoder, and what swings by more than 1 N in the "
-      "second: one count is that much at 1 N / count length, so nothing above can be found there, at any "
+      "second: one count is that much at 1 N / count length, so what flickers between two counts ends there, "
+      "at any "
       "rate.");
   std::vector<double> encoders;
   for (const RateResult& result : results) encoders.push_back(result.setting.count_length);

@@ -349,8 +349,10 @@ report::Picture draw_damping_map(const DampingMap& map, const std::filesystem::p
 
 // --- Walls that grow stiff (growing_walls.cpp) ------------------------------------------------------------
 
-/// wall.touch_stiffness, wall.growth_time, and a damper over one sample. N/m, s, N s/m.
-WallChange growing(double touch_stiffness, double growth_time, double damping);
+/// wall.touch_stiffness, wall.growth_time, and a damper over one sample. N/m, s, N s/m. `calm_by`: what the
+/// handle is called calm by.
+WallChange growing(double touch_stiffness, double growth_time, double damping,
+                   control::VelocityEstimatorKind calm_by = control::VelocityEstimatorKind::foaw);
 /// Adds -1.5 N, into the wall, and then +1.5 N for 20 ms each, 1.9 and 2.05 s after the first contact.
 void pulse(TouchSetup& setup);
 
@@ -386,7 +388,15 @@ struct GrowingResult {
 };
 std::vector<LoopSetting> growing_situations();
 std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const StiffnessRun& run);
-report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls);
+/// A wall that need not come to its stiffness: how stiff it can be set, and what is left of that.
+struct SeemingResult {
+  std::string wall, calm_by;
+  PeopleMean stable;      ///< by both criteria
+  double rendered = 0.0;  ///< share of the mean's stiffness, mean of all touches
+};
+std::vector<SeemingResult> run_seeming_walls(const SubjectSet& set, const StiffnessRun& run);
+report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls,
+                                const std::vector<SeemingResult>& seeming);
 report::Section drawn_section(const std::vector<DrawnResult>& results);
 
 // --- Rate of the loop, encoder and velocity estimator (loop_rates.cpp) -------------------------------------

@@ -26,7 +26,7 @@ GridOptimum optimum_of(const DesignTask& task, const WallGrid& grid, const WallF
   GridOptimum best{floor};
   bool found = false;
   const auto holds = [&](double damping, int rung) {
-    return !trials.first_unstable({family, damping, grid.stiffness(rung)}, touches);
+    return !trials.first_not_held({family, damping, grid.stiffness(rung)}, touches);
   };
   for (const double damping : grid.dampings) {
     const int steps = best.rung < grid.first ? 0 : (best.rung - grid.first) / grid.step + 1;

@@ -27,7 +27,7 @@ int plain_optimum(const DesignTask& task, const WallGrid& grid) {
   int best = -1;
   for (const experiment::WallFamily& family : experiment::families_of(task)) {
     for (const double damping : grid.dampings) {
-      for (int rung = grid.first; !trials.first_unstable({family, damping, grid.stiffness(rung)});
+      for (int rung = grid.first; !trials.first_not_held({family, damping, grid.stiffness(rung)});
            rung += grid.step)
         best = std::max(best, rung);
     }
@@ -83,7 +83,7 @@ TEST(WallDesign, HoldsForEverybodyOnRandomDevicesWhenItIsSofter) {
       const experiment::FamilyResult found = experiment::search_family(task, family, -1, {});
       experiment::WallTrials trials(task);
       for (const int rung : experiment::rungs_below(found.rung))
-        EXPECT_FALSE(trials.first_unstable({family, found.damping, experiment::stiffness_of(rung)}))
+        EXPECT_FALSE(trials.first_not_held({family, found.damping, experiment::stiffness_of(rung)}))
             << seed << ' ' << name_of(family) << ' ' << rung;
     }
   }

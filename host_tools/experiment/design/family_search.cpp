@@ -80,7 +80,7 @@ class FamilySearch {
   void try_damping(double damping) { improve(damping, highest(damping, best_.rung + 1, top_rung)); }
 
   DesignedWall wall_at(double damping, int rung) const { return {family_, damping, stiffness_of(rung)}; }
-  bool holds(double damping, int rung) { return !trials_.first_unstable(wall_at(damping, rung), hard_); }
+  bool holds(double damping, int rung) { return !trials_.first_not_held(wall_at(damping, rung), hard_); }
 
   /// Every damping against the hard touches, then the best ones against everybody. `centre`: the best of the
   /// first, which need not be above the bound.
@@ -99,8 +99,8 @@ class FamilySearch {
   /// Takes a damping that holds up to `rung` for the hard touches as the best, if it is for everybody.
   void improve(double damping, int rung) {
     while (rung > best_.rung) {
-      if (const auto unstable = trials_.first_unstable(wall_at(damping, rung))) {
-        hard_.insert(hard_.begin(), unstable->number);
+      if (const auto ending = trials_.first_not_held(wall_at(damping, rung))) {
+        hard_.insert(hard_.begin(), ending->number);
         rung = highest(damping, best_.rung + 1, rung - 1);
       } else if (!allowed(damping, rung)) {
         return;  // a softer one is no less deep
@@ -122,8 +122,8 @@ class FamilySearch {
     for (const int lower : rungs)
       if (!holds(damping, lower)) return lower - 1;
     for (const int lower : rungs) {
-      if (const auto unstable = trials_.first_unstable(wall_at(damping, lower))) {
-        hard_.insert(hard_.begin(), unstable->number);
+      if (const auto ending = trials_.first_not_held(wall_at(damping, lower))) {
+        hard_.insert(hard_.begin(), ending->number);
         return lower - 1;
       }
     }

@@ -176,7 +176,7 @@ bool holds_in_four_phases(const DesignTask& task, const DesignedWall& wall, cons
   const auto held = by_each_person<int>(task, run, design, [&](WallTrials& trials, std::size_t person) {
     for (const std::size_t number : touches_by(task, person))
       for (const double phase : {0.0, 0.25, 0.5, 0.75})
-        if (trials.touch(wall, number, phase).unstable()) return 0;
+        if (!trials.touch(wall, number, phase).held()) return 0;
     return 1;
   });
   return std::all_of(held.begin(), held.end(), [](int one) { return one == 1; });
@@ -189,9 +189,8 @@ void tell_bound(const DesignTask& task, int rung, WallDesign& design) {
   // By everybody only each second rung was tried.
   for (int above = rung + 1; above <= std::min(rung + 16, top_rung); ++above) {
     next.stiffness = stiffness_of(above);
-    if (const auto unstable = trials.first_unstable(next)) {
-      design.bound = {case_of(task, unstable->number), unstable->by_force, unstable->peak_to_peak,
-                      next.stiffness};
+    if (const auto ending = trials.first_not_held(next)) {
+      design.bound = {case_of(task, ending->number), *ending, next.stiffness};
       break;
     }
   }

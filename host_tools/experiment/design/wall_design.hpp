@@ -17,6 +17,7 @@
 
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/experiment/design/family_search.hpp"
+#include "host_tools/experiment/design/wall_trials.hpp"
 #include "host_tools/experiment/progress_report.hpp"
 #include "host_tools/experiment/run_journal.hpp"
 #include "host_tools/experiment/touch_price.hpp"
@@ -40,9 +41,8 @@ void search_share(const DesignTask& task, const Share& share, RunJournal& journa
 /// The touch that ends the next stiffer wall.
 struct DesignBound {
   TouchCase touch;
-  bool by_force = false;      ///< else by the position
-  double peak_to_peak = 0.0;  ///< N or m
-  double stiffness = 0.0;     ///< N/m, of the wall that it ends
+  EndingTouch ending;
+  double stiffness = 0.0;  ///< N/m, of the wall that it ends
 };
 
 /// What changes of the task, and what that buys.

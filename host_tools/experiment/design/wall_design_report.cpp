@@ -22,14 +22,22 @@ std::string touch_case_text(const DesignTask& task, const TouchCase& touch) {
                      touch.speed, touch.push);
 }
 
-std::string swing_words(bool by_force, double peak_to_peak) {
-  return by_force ? fmt::format("the force swings by {:.3g} N", peak_to_peak)
-                  : fmt::format("the handle moves by {:.3g} mm", peak_to_peak * 1e3);
+std::string ending_words(const EndingTouch& ending) {
+  if (ending.softer)
+    return fmt::format("the wall comes to {:.0f} % of that and no more", 100.0 * ending.rendered_share);
+  return ending.by_force
+             ? fmt::format("the force swings by {:.3g} N, peak to peak", ending.peak_to_peak)
+             : fmt::format("the handle moves by {:.3g} mm, peak to peak", ending.peak_to_peak * 1e3);
 }
 
 std::string criteria_words(const DesignTask& task) {
-  return fmt::format("the handle moves by no more than {:g} mm and the force swings by no more than {:g} N",
-                     task.protocol.threshold * 1e3, task.protocol.force_threshold);
+  std::string words =
+      fmt::format("the handle moves by no more than {:g} mm and the force swings by no more than {:g} N",
+                  task.protocol.threshold * 1e3, task.protocol.force_threshold);
+  if (task.growth_time > 0.0)
+    words += fmt::format(", and a wall that grows comes to {:g} % of its stiffness or more",
+                         100.0 * TouchSetup().least_rendered_share);
+  return words;
 }
 
 std::string bound_words(const DesignTask& task, const WallDesign& design) {
@@ -37,8 +45,8 @@ std::string bound_words(const DesignTask& task, const WallDesign& design) {
     return fmt::format("Bound by nothing: it holds up to {}, the most that is looked at.",
                        stiffness_words(design.largest));
   const DesignBound& bound = *design.bound;
-  return fmt::format("Bound by {}: with {} {}, peak to peak.", touch_case_text(task, bound.touch),
-                     stiffness_words(bound.stiffness), swing_words(bound.by_force, bound.peak_to_peak));
+  return fmt::format("Bound by {}: with {} {}.", touch_case_text(task, bound.touch),
+                     stiffness_words(bound.stiffness), ending_words(bound.ending));
 }
 
 std::string change_words(const WallDesign& design) {

@@ -25,23 +25,24 @@ TouchOutcome WallTrials::touch(const DesignedWall& wall, std::size_t number, dou
   return outcome;
 }
 
-std::optional<UnstableTouch> WallTrials::first_unstable(const DesignedWall& wall,
-                                                        std::vector<std::size_t>& numbers) {
+std::optional<EndingTouch> WallTrials::first_not_held(const DesignedWall& wall,
+                                                      std::vector<std::size_t>& numbers) {
   std::fill(touched_.begin(), touched_.end(), 0);
   for (auto at = numbers.begin(); at != numbers.end(); ++at) {
     const TouchOutcome outcome = touch(wall, *at);
-    if (!outcome.unstable()) continue;
-    const UnstableTouch found{*at, outcome.by_force, outcome.peak_to_peak};
+    if (outcome.held()) continue;
+    const EndingTouch found{*at, outcome.by_force, outcome.peak_to_peak, outcome.rendered_share,
+                            !outcome.unstable()};
     std::rotate(numbers.begin(), at, at + 1);
     return found;
   }
   return std::nullopt;
 }
 
-std::optional<UnstableTouch> WallTrials::first_unstable(const DesignedWall& wall) {
+std::optional<EndingTouch> WallTrials::first_not_held(const DesignedWall& wall) {
   std::vector<std::size_t> all(task_.touches());
   std::iota(all.begin(), all.end(), 0U);
-  return first_unstable(wall, all);
+  return first_not_held(wall, all);
 }
 
 bool WallTrials::everybody_touched() const {

@@ -10,10 +10,12 @@
 namespace kmax::experiment {
 
 /// What ended a wall.
-struct UnstableTouch {
-  std::size_t number = 0;     ///< case_of()
-  bool by_force = false;      ///< else by the position
-  double peak_to_peak = 0.0;  ///< N or m
+struct EndingTouch {
+  std::size_t number = 0;       ///< case_of()
+  bool by_force = false;        ///< else by the position
+  double peak_to_peak = 0.0;    ///< N or m
+  double rendered_share = 1.0;  ///< TouchOutcome's
+  bool softer = false;          ///< nothing oscillates, but the wall grew to too small a share
 };
 
 /// Touches of walls by the people of one task, counted, with the tables of each person kept from touch to
@@ -25,12 +27,12 @@ class WallTrials {
   /// One touch. `phase`: the share of a sample's way that it begins further out.
   TouchOutcome touch(const DesignedWall& wall, std::size_t number, double phase = 0.0);
 
-  /// Goes through the touches `numbers` up to the first that is unstable, which moves to the front: what has
+  /// Goes through the touches `numbers` up to the first that is not held, which moves to the front: what has
   /// ended one wall is likely to end the next.
-  std::optional<UnstableTouch> first_unstable(const DesignedWall& wall, std::vector<std::size_t>& numbers);
+  std::optional<EndingTouch> first_not_held(const DesignedWall& wall, std::vector<std::size_t>& numbers);
   /// Through all touches of all people.
-  std::optional<UnstableTouch> first_unstable(const DesignedWall& wall);
-  /// Did everybody get into the wall in one of the touches that the last call of first_unstable() made?
+  std::optional<EndingTouch> first_not_held(const DesignedWall& wall);
+  /// Did everybody get into the wall in one of the touches that the last call of first_not_held() made?
   bool everybody_touched() const;
 
   /// m, deepest of all touches of all people, and its touch.

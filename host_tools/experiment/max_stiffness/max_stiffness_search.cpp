@@ -114,7 +114,7 @@ class TouchesOfStiffness {
     result.event_limit_hits += outcome.event_limit_hits;
     search.saturated = std::max(search.saturated, outcome.saturated_share);
     search.touched = search.touched || outcome.verdict != simulation::ContactVerdict::no_contact;
-    search.unstable = outcome.unstable();
+    search.unstable = !outcome.held();
     if (!search.unstable) return;
     result.ending_speed = touch_.motion.approach_speed;
     result.ending_push = touch_.motion.push_force;

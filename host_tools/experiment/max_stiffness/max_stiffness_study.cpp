@@ -92,23 +92,33 @@ double mean_stiffness(std::span<const MaxStiffness> results) {
   return results.empty() ? 0.0 : sum / static_cast<double>(results.size());
 }
 
+namespace {
+double deviation_of(std::span<const MaxStiffness> results) {
+  if (results.size() < 2) return 0.0;
+  const double centre = mean_stiffness(results);
+  double sum = 0.0;
+  for (const MaxStiffness& subject : results) sum += std::pow(subject.stiffness - centre, 2);
+  return std::sqrt(sum / static_cast<double>(results.size() - 1));
+}
+}  // namespace
+
+double mean_interval(std::span<const MaxStiffness> results) {
+  const auto people = static_cast<double>(results.size());
+  if (people < 2.0) return 0.0;
+  return boost::math::quantile(boost::math::students_t(people - 1.0), 0.975) * deviation_of(results) /
+         std::sqrt(people);
+}
+
 double ConditionResult::mean() const {
   return mean_stiffness(subjects);
 }
 
 double ConditionResult::standard_deviation() const {
-  if (subjects.size() < 2) return 0.0;
-  const double centre = mean();
-  double sum = 0.0;
-  for (const MaxStiffness& subject : subjects) sum += std::pow(subject.stiffness - centre, 2);
-  return std::sqrt(sum / static_cast<double>(subjects.size() - 1));
+  return deviation_of(subjects);
 }
 
 double ConditionResult::interval() const {
-  const auto people = static_cast<double>(subjects.size());
-  if (people < 2.0) return 0.0;
-  return boost::math::quantile(boost::math::students_t(people - 1.0), 0.975) * standard_deviation() /
-         std::sqrt(people);
+  return mean_interval(subjects);
 }
 
 double ConditionResult::largest_saturated_share() const {

@@ -50,9 +50,7 @@ struct ConditionResult {
   std::vector<MaxStiffness> subjects;  // in the order of the set's
   double mean() const;                 // N/m
   double standard_deviation() const;   // N/m, of the sample
-  // N/m: the mean of all such people lies within this of the sample's with 95 % (Student); 0 for fewer than
-  // two. A search that ended before somebody's largest stiffness makes mean and interval too low.
-  double interval() const;
+  double interval() const;             // N/m, mean_interval()
   double largest_saturated_share() const;
 };
 
@@ -83,6 +81,9 @@ MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const StiffnessRun& run);
 
 double mean_stiffness(std::span<const MaxStiffness> results);  // N/m
+// N/m: the mean of all such people lies within this of the sample's with 95 % (Student); 0 for fewer than two.
+// A search that ended before somebody's largest stiffness makes mean and interval too low.
+double mean_interval(std::span<const MaxStiffness> results);
 
 // People whose number in a mean is only a bound.
 struct CountedEnds {

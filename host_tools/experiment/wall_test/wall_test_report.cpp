@@ -114,7 +114,8 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
       fmt::format(
           "Unstable by position: more than {:g} mm peak to peak in every quarter of the last second "
           "of the hold; by force: more than {:g} N. Neither paper gives a measure: the first is three "
-          "counts of paper 1's device, the second is felt while a stiff wall moves by less than that. "
+          "counts of paper 1's device, the second our own choice, since a stiff wall swings by newtons "
+          "while it moves by less than that. "
           "A touch is stable if it is by both.",
           settings.threshold * 1e3, settings.force_threshold)};
   words.emplace_back(

@@ -215,8 +215,10 @@ Json touch_json(const DesignTask& task, const experiment::TouchCase& touch) {
 Json bound_json(const DesignTask& task, const WallDesign& design) {
   if (!design.bound) return nullptr;
   Json json = touch_json(task, design.bound->touch);
-  json["criterion"] = design.bound->by_force ? "force" : "position";
-  json["peak_to_peak"] = design.bound->peak_to_peak;
+  const experiment::EndingTouch& ending = design.bound->ending;
+  json["criterion"] = ending.softer ? "rendered_share" : ending.by_force ? "force" : "position";
+  json["peak_to_peak"] = ending.peak_to_peak;
+  json["rendered_share"] = ending.rendered_share;
   json["stiffness_n_per_m"] = design.bound->stiffness;
   return json;
 }

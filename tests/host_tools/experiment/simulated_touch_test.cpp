@@ -225,9 +225,44 @@ TEST(SimulatedTouch, RefusesSettingsThatMakeNoSense) {
   refused([](TouchSetup& s) { s.threshold = 0.0; });
   refused([](TouchSetup& s) { s.threshold = std::numeric_limits<double>::quiet_NaN(); });
   refused([](TouchSetup& s) { s.force_threshold = -1.0; });
+  refused([](TouchSetup& s) { s.least_rendered_share = 1.1; });
+  refused([](TouchSetup& s) { s.least_rendered_share = std::numeric_limits<double>::quiet_NaN(); });
   refused([](TouchSetup& s) { s.wall.count_length = 0.0; });
   refused([](TouchSetup& s) { s.device.mass = -1.0; });
   refused([](TouchSetup& s) { s.person.grip_stiffness = std::numeric_limits<double>::infinity(); });
+}
+
+TouchSetup growing(double stiffness, control::VelocityEstimatorKind calm_by) {
+  TouchSetup setup = plain(stiffness);
+  setup.wall.wall.growing.touch_stiffness = 2000.0F;
+  setup.wall.velocity = {.kind = calm_by};
+  return setup;
+}
+
+TEST(SimulatedTouch, AWallThatGrowsIsHeldOnceItHasComeToItsStiffness) {
+  const TouchOutcome outcome = simulate_touch(growing(8000.0, control::VelocityEstimatorKind::foaw));
+  EXPECT_FALSE(outcome.unstable());
+  EXPECT_GT(outcome.rendered_share, 0.99);
+  EXPECT_TRUE(outcome.held());
+  EXPECT_EQ(simulate_touch(plain(2000)).rendered_share, 1.0);
+}
+
+// Noticing each count, it takes back what it has grown and never gets there.
+TEST(SimulatedTouch, AWallThatStaysFarSofterThanItWasSetIsNotHeldHoweverStill) {
+  TouchSetup setup = growing(15000.0, control::VelocityEstimatorKind::difference);
+  setup.motion.push_force = 1.0;
+  for (const bool by_force : {false, true}) {
+    setup.force_threshold = by_force ? 1.0 : 0.0;
+    const TouchOutcome outcome = simulate_touch(setup);
+    EXPECT_FALSE(outcome.unstable());
+    EXPECT_LT(outcome.rendered_share, 0.7);
+    EXPECT_GT(outcome.rendered_share, 2.0 / 15.0);
+    EXPECT_FALSE(outcome.held());
+  }
+  const TouchJudgement each[]{{false, 0.165e-3}, {true, 1.0}};
+  for (const TouchOutcome& outcome : judge_touch(setup, each)) EXPECT_FALSE(outcome.held());
+  setup.least_rendered_share = 0.0;
+  EXPECT_TRUE(simulate_touch(setup).held());
 }
 
 // One rule for what a person answers to, whatever the experiment.

@@ -84,10 +84,10 @@ TEST(WallDesign, HoldsForEverybodyAndTheNextStifferOneDoesNot) {
   WallTrials trials(task);
   DesignedWall largest = design.wall;
   largest.stiffness = design.largest;
-  EXPECT_FALSE(trials.first_unstable(largest));
-  EXPECT_FALSE(trials.first_unstable(design.wall));
+  EXPECT_FALSE(trials.first_not_held(largest));
+  EXPECT_FALSE(trials.first_not_held(design.wall));
   largest.stiffness = design.bound->stiffness;
-  EXPECT_TRUE(trials.first_unstable(largest));
+  EXPECT_TRUE(trials.first_not_held(largest));
   EXPECT_LT(design.bound->stiffness, 1.05 * design.largest);
   EXPECT_NEAR(design.wall.stiffness, 0.8 * design.largest, 0.01 * design.largest);
   EXPECT_EQ(design.price.field_at_rest, 0.0);
@@ -147,7 +147,7 @@ TEST(WallDesign, HoldsForEverybodyWhenItIsSofter) {
   ASSERT_GT(rungs.size(), 30U);
   WallTrials trials(task);
   for (const int rung : rungs)
-    EXPECT_FALSE(trials.first_unstable({families_of(task).front(), found.damping, stiffness_of(rung)}))
+    EXPECT_FALSE(trials.first_not_held({families_of(task).front(), found.damping, stiffness_of(rung)}))
         << rung;
 }
 
@@ -173,10 +173,11 @@ TEST(WallDesign, ItsFileIsTheWallAndSaysWhereItComesFrom) {
   design.found = true;
   design.wall = {{{control::VelocityEstimatorKind::low_pass, 16, 100.0F}, 1.0, 3e-3}, 8.0, 5500.0};
   design.largest = 7000.0;
-  design.bound = DesignBound{{1, 0.5, 0.6}, true, 1.5, 7070.0};
+  design.bound = DesignBound{{1, 0.5, 0.6}, {.by_force = true, .peak_to_peak = 1.5}, 7070.0};
   const std::string text = wall_design_file(task, design);
   EXPECT_CONTAINS(text, "# A wall by 'kmax design wall'");
   EXPECT_CONTAINS(text, "drawn 2 at 0.5 m/s with a push of 0.6 N");
+  EXPECT_CONTAINS(text, "the force swings by 1.5 N");
   EXPECT_CONTAINS(text, "stiffness = 5500");
   EXPECT_CONTAINS(text, "estimator = \"low_pass\"");
   EXPECT_CONTAINS(text, "magnetic_length = 0.003");
