@@ -193,8 +193,10 @@ report::Table baseline_table(std::string caption, const SubjectSet& set,
                       {}};
   for (const BaselineResult& result : results) {
     const auto cell = [&](const PeopleMean& found, const char* which) {
-      return marks.cell(found.mean, found.ends, set.subjects.size(),
-                        fmt::format("{}, {}", result.law.name, which));
+      return fmt::format("{} ± {}",
+                         marks.cell(found.mean, found.ends, set.subjects.size(),
+                                    fmt::format("{}, {}", result.law.name, which)),
+                         n_per_mm(experiment::mean_interval(found.people)));
     };
     table.rows.push_back(
         {result.law.name, cell(result.moves, "moves"), cell(result.phases, "4 phases"),
@@ -263,7 +265,8 @@ report::Section baseline_section(const SubjectSet& set, const std::vector<Baseli
   report::Section section{
       fmt::format("Baselines, and what they cost ({})", experiment::clip_words(set.device)), {}, {}, {}};
   section.tables.push_back(baseline_table(
-      "Largest stable stiffness, mean of the people, and what the wall costs", set, results, marks));
+      "Largest stable stiffness, mean of the people with its 95 % interval, and what the wall costs", set,
+      results, marks));
   const BaselineResult& field = named(results, "field of 2 N");
   const BaselineResult& damper = named(results, "damping 8 N s/m, difference");
   section.paragraphs = {

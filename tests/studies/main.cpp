@@ -95,7 +95,7 @@ void add_velocity(CLI::App& studies) {
 int run(int count, char** arguments) {
   std::string help = "Studies around the largest stable stiffness of simulated people.\n";
   for (const Study& study : all_studies) help += fmt::format("  {:<13}{}\n", study.name, study.what);
-  CLI::App app(help + "  all          all of them: more than half an hour on two cores");
+  CLI::App app(help + "  all          all of them: a quarter of an hour on two cores");
   std::vector<std::string> names, sets{"clipped", "unclipped"};
   StudyInput input;
   app.add_option("STUDY", names, "Names of studies, in the order of the page; none: 'largest'");
