@@ -68,7 +68,7 @@ inline constexpr NamedValue velocity_estimator[] = {
     named("tracking", VelocityEstimatorKind::tracking),
     named("edge_period", VelocityEstimatorKind::edge_period)};
 // Modes that would remove a danger are listed only when this firmware has them: a guard that is accepted and
-// ignored is worse than none. Plain data of parts to come (motor, supply) can be stored already and say so.
+// ignored is worse than none.
 inline constexpr NamedValue guard_mode[] = {{"off", 0}, {"warn", 1}, {"refuse", 2}};
 inline constexpr NamedValue guard_verdict[] = {{"not_judged", 0}, {"pass", 1}, {"fail", 2}};
 /// In the numbers of control::Criterion.

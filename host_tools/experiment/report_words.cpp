@@ -55,4 +55,9 @@ std::string clipping_words(const simulation::DeviceModel& device) {
                                   : std::string("not clipped");
 }
 
+std::string model_words(const simulation::DeviceModel& device, const simulation::OperatorModel& person) {
+  return fmt::format("The handle has {:g} g and {:g} N of friction, the hand's gamma is {:g} /N.",
+                     device.mass * 1e3, device.friction, person.activation_gain);
+}
+
 }  // namespace kmax::experiment

@@ -9,6 +9,7 @@
 #include "control/velocity_estimator.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/simulation/device_model.hpp"
+#include "host_tools/simulation/operator_model.hpp"
 
 namespace kmax::experiment {
 
@@ -40,5 +41,9 @@ std::string estimator_name(control::VelocityEstimatorKind estimator);
 
 /// What the simulated device makes of a force: "clipped at 3.3 N", "not clipped".
 std::string clipping_words(const simulation::DeviceModel& device);
+
+/// A sentence with the numbers of both that decide how stiff a wall can be. Each experiment has its own:
+/// those of the largest stiffness are fitted to its means.
+std::string model_words(const simulation::DeviceModel& device, const simulation::OperatorModel& person);
 
 }  // namespace kmax::experiment

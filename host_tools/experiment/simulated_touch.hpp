@@ -57,8 +57,8 @@ struct TouchSetup {
   // For many touches of one person with one device, one after the other: propagator_table.hpp. May be null.
   std::shared_ptr<simulation::PropagatorTable> matrices;
   control::HapticLoopConfig<float> wall = touched_wall(500.0, 0.055e-3, 3.3);
-  double window = 1.0;          // s, the end of the hold that is judged
-  double threshold = 0.165e-3;  // m peak to peak
+  double window = 1.0;                             // s, the end of the hold that is judged
+  double threshold = simulation::unstable_motion;  // m peak to peak
   // N peak to peak. Above 0: judged is the force asked for, by the same rule, instead of the position. A
   // stiff wall on a coarse encoder swings by newtons while the handle moves by less than a count.
   double force_threshold = 0.0;
@@ -106,7 +106,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
 // One criterion: the position, m peak to peak, or the force asked for, N peak to peak.
 struct TouchJudgement {
   bool by_force = false;
-  double threshold = 0.165e-3;
+  double threshold = simulation::unstable_motion;
 };
 
 // One touch judged by several criteria, each by itself: to the last bit what simulate_touch() gives with each

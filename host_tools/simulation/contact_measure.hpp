@@ -31,6 +31,8 @@
 
 namespace kmax::simulation {
 
+/// m peak to peak, beyond which a handle moves: three counts of paper 1's device. No paper gives a measure.
+inline constexpr double unstable_motion = 0.165e-3;
 inline constexpr double rounding_allowance = 1e-6;  // of the threshold
 
 struct ContactSample {
@@ -39,12 +41,12 @@ struct ContactSample {
 };
 
 struct ContactCriterion {
-  double window_begin = 0.0;    // s
-  double window_end = 1.0;      // s
-  double threshold = 0.165e-3;  // m, > 0
-  double wall_position = 0.0;   // m
-  double wall_side = 1.0;       // +1 or -1: free space is on this side
-  double contact_margin = 0.0;  // m, >= 0: how far outside still counts as contact
+  double window_begin = 0.0;           // s
+  double window_end = 1.0;             // s
+  double threshold = unstable_motion;  // m, > 0
+  double wall_position = 0.0;          // m
+  double wall_side = 1.0;              // +1 or -1: free space is on this side
+  double contact_margin = 0.0;         // m, >= 0: how far outside still counts as contact
 };
 
 enum class ContactVerdict { stable, unstable, no_contact };

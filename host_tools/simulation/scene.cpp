@@ -375,12 +375,6 @@ class SceneReader : private SceneTables {
     }
   }
 
-  // Axis 0 need not be named: `axis0.wall.position` and `wall.position` are one parameter.
-  static std::string_view without_axis_0(std::string_view name) {
-    constexpr std::string_view axis = "axis0.";
-    return name.starts_with(axis) ? name.substr(axis.size()) : name;
-  }
-
   static const SceneParameter* find_parameter(const Scene& scene, const std::string& prefix,
                                               std::string_view name) {
     for (const SceneParameter& parameter : scene.parameters) {

@@ -26,6 +26,7 @@
 #include <variant>
 #include <vector>
 
+#include "host_tools/simulation/contact_measure.hpp"
 #include "host_tools/simulation/coupled_handle.hpp"
 #include "host_tools/simulation/defect.hpp"
 #include "host_tools/simulation/device_model.hpp"
@@ -45,11 +46,17 @@ class SceneError : public std::runtime_error {
 };
 
 struct Measurement {
-  double window = 1.0;          // s
-  double threshold = 0.165e-3;  // m
+  double window = 1.0;                 // s
+  double threshold = unstable_motion;  // m
 };
 
 using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
+
+/// Axis 0 need not be named: `axis0.wall.position` and `wall.position` are one parameter.
+constexpr std::string_view without_axis_0(std::string_view name) {
+  constexpr std::string_view axis = "axis0.";
+  return name.starts_with(axis) ? name.substr(axis.size()) : name;
+}
 
 struct SceneParameter {
   std::string name;

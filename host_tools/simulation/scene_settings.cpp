@@ -26,11 +26,6 @@ std::optional<std::string> take_axis(std::string_view& name) {
   return axis;
 }
 
-std::string_view without_axis_0(std::string_view name) {
-  constexpr std::string_view axis = "axis0.";
-  return name.starts_with(axis) ? name.substr(axis.size()) : name;
-}
-
 // However its name is spread over tables in the file.
 void erase_parameter(toml::table& table, const std::string& prefix, std::string_view name) {
   std::vector<std::string> erased;

@@ -347,10 +347,8 @@ report::Section audit_section(const AuditComparison& comparison) {
   section.tables = {std::move(laws), std::move(readings)};
   section.paragraphs = {
       "An audit wrote a second simulator, with a person, a controller and a judge of its own, for the same "
-      "people, "
-      "device, touches and criteria, 500 Hz and 55 um, and printed the largest stiffness of 13 laws. Its "
-      "code is "
-      "not at hand; its words are short, so a law may be meant in several ways.",
+      "people, device, touches and criteria, 500 Hz and 55 um, and printed the largest stiffness of 13 laws. "
+      "Its code is not at hand; its words are short, so a law may be meant in several ways.",
       fmt::format(
           "Of {} laws {} come out within the noise, which is measured: the range of four more studies whose "
           "touches begin up to 1.1 mm further out, and 0.1 N/mm, a step of the search. Of the others {} can "
@@ -362,8 +360,7 @@ report::Section audit_section(const AuditComparison& comparison) {
   for (std::string& words : factor_words(comparison)) section.paragraphs.push_back(std::move(words));
   section.paragraphs.emplace_back(
       "Ours that grow count as held only if they come to 95 % of their stiffness. Nothing says that the "
-      "audit asked "
-      "for that, so all of their readings may stay softer.");
+      "audit asked for that, so all of their readings may stay softer.");
   return section;
 }
 

@@ -248,9 +248,9 @@ std::string rating_words(const std::vector<BaselineResult>& results) {
     });
   };
   return fmt::format(
-      "Transparency was rated by people (paper 1, Figs. 7 and 8), and nothing here computes a rating. What "
-      "a wall costs is the field's force on a handle at rest on the surface and the work against it on the "
-      "way in. The paper's three ratings fall as the field at rest rises: {}; as the work rises: {}.",
+      "Transparency was rated by people (paper 1, Figs. 7 and 8), and nothing here computes a rating. What a "
+      "wall costs is the field's force on a handle at rest on the surface and the work against it on the way "
+      "in. The paper's three ratings fall as the field at rest rises: {}; as the work rises: {}.",
       rises(&WallPrice::field_at_rest) ? "yes" : "no", rises(&WallPrice::work) ? "yes" : "no");
 }
 
@@ -274,22 +274,17 @@ report::Section baseline_section(const SubjectSet& set, const std::vector<Baseli
           "A wall counts as unstable when the handle moves by more than 0.165 mm, or when its force swings "
           "by more than {:g} N. With 4 phases every touch is made four times, meeting the surface at other "
           "times within a sample. 'Both' is the mean of what each of the people can have by the one of "
-          "position "
-          "and force that gives it less. Costs are of one touch of {} N/mm at {:g} m/s. {:g} N is our own "
-          "choice, "
-          "taken from no study: three tenths of what the papers' device can push with. Fingers feel far "
-          "smaller "
-          "vibrations, so what passes may still be felt.",
+          "position and force that gives it less. Costs are of one touch of {} N/mm at {:g} m/s. {:g} N is "
+          "our own choice, taken from no study: three tenths of what the papers' device can push with. "
+          "Fingers feel far smaller vibrations, so what passes may still be felt.",
           felt_force, n_per_mm(priced_stiffness), priced_speed, felt_force),
       fmt::format(
           "Peak force is the most that wall and field push with until the end of the hold; the work over the "
           "touch is what the hand has put in against them by then: stored in the spring, or taken by a "
           "damper. Below 0 an oscillating wall has given more than it took; the plain wall allows {} N/mm. "
           "Rate-hardness (Lawrence, Pao, Dougherty, Salada, Pavlou 2000) is how fast the force rises in the "
-          "first "
-          "4 ms after the contact, for each m/s of the handle's speed there; below 0 a damper or field has "
-          "pushed "
-          "more at the contact than the wall does 4 ms later.",
+          "first 4 ms after the contact, for each m/s of the handle's speed there; below 0 a damper or field "
+          "has pushed more at the contact than the wall does 4 ms later.",
           n_per_mm(results.front().moves.mean)),
       fmt::format(
           "Damping of 8 N s/m without any field allows {} N/mm, the paper's 2 N field {}; by the force that "
@@ -322,15 +317,15 @@ report::Section relation_section(const SubjectSet& set, const std::vector<Baseli
       "The paper tried a linear, a square and a square-root relation, chose the linear one and calls [0.8, "
       "2.0] N the best interval; it prints no numbers of the others and does not say what best means.",
       fmt::format(
-          "Instant, from 0.8 to 2 N: linear {}, square {}, square root {} N/mm. V_k stays below 0.3 at "
-          "these speeds, where the square hardly leaves 0.8 N and the square root rises most, which "
-          "costs more work on the way in.",
+          "Instant, from 0.8 to 2 N: linear {}, square {}, square root {} N/mm. V_k stays below 0.3 at these "
+          "speeds, where the square hardly leaves 0.8 N and the square root rises most, which costs more "
+          "work on the way in.",
           found(chosen), found("square, instant, 0.8 to 2 N"), found("square root, instant, 0.8 to 2 N")),
       fmt::format(
           "Linear and instant, up to 2 N: {} N/mm from 0 N, {} from 0.8, {} from 1.6; from 0.8 N up to 1.4 N "
-          "{}, up to 3 N {}. The lower end decides and is paid for as a field at rest; the upper "
-          "one is reached at 1.2 m/s only. Better than {} by both criteria at no higher cost: {}. So "
-          "stiffness and cost do not single the paper's interval out.",
+          "{}, up to 3 N {}. The lower end decides and is paid for as a field at rest; the upper one is "
+          "reached at 1.2 m/s only. Better than {} by both criteria at no higher cost: {}. So stiffness and "
+          "cost do not single the paper's interval out.",
           found("linear, instant, 0 to 2 N"), found(chosen), found("linear, instant, 1.6 to 2 N"),
           found("linear, instant, 0.8 to 1.4 N"), found("linear, instant, 0.8 to 3 N"), chosen,
           better.empty() ? "none of these" : fmt::format("{}", fmt::join(better, "; ")))};
@@ -395,8 +390,8 @@ std::vector<report::Section> baselines(const StudyInput& input) {
       const plot::Figure figure = price_front(set, results);
       plot::write_figure(figure, file);
       sections.back().pictures = {{figure.title +
-                                       ": the further right, the stiffer; shallow, hard and without a "
-                                       "field is better.",
+                                       ": the further right, the stiffer; shallow, hard and without a field "
+                                       "is better.",
                                    file}};
     }
     const std::vector<BaselineResult> relations = run_baselines(set, relation_baselines(), input.run);

@@ -142,8 +142,9 @@ TEST(BaselineSection, TheFrontAndTheRatingsFollowTheNumbers) {
     result.price = {0.0, 0.0, 0.5e-3};
   }
   const report::Section section = baseline_section(two_people(), results);
-  EXPECT_EQ(section.tables[0].rows[1], (Row{"field of 2 N", ">4.00", "3.90", "4.00", "3.80", "2.00", "1.50",
-                                            "4.50", "3.25", "1.00", "0.00", "2.58"}));
+  EXPECT_EQ(section.tables[0].rows[1],
+            (Row{"field of 2 N", ">4.00 ± 0.00", "3.90 ± 0.00", "4.00 ± 0.00", "3.80 ± 0.00", "2.00", "1.50",
+                 "4.50", "3.25", "1.00", "0.00", "2.58"}));
   const std::string said = paragraphs_of(section);
   EXPECT_CONTAINS(said, "Damping of 8 N s/m without any field allows 9.60 N/mm, the paper's 2 N field 4.00");
   EXPECT_CONTAINS(said, "hard: damping 8 N s/m, difference.");

@@ -12,6 +12,7 @@ namespace {
 
 using Kind = control::VelocityEstimatorKind;
 constexpr auto difference = Kind::difference;
+constexpr std::string_view finer_encoder = "5.5 um";
 constexpr std::uint32_t drawn_seed = 5;
 constexpr std::size_t drawn_count = 200;
 
@@ -54,7 +55,10 @@ std::vector<LoopSetting> growing_situations() {
   return {{"usual", [](TouchSetup&) {}},
           {"pulses", pulse},
           {"0.5 ms of delay", [](TouchSetup& setup) { setup.device.delay = 0.5e-3; }},
-          {"structure of 2.31 N/mm", [](TouchSetup& setup) { bend(setup.device, 2310.0); }}};
+          {"structure of 2.31 N/mm", [](TouchSetup& setup) { bend(setup.device, 2310.0); }},
+          {"structure of 1.02 N/mm", [](TouchSetup& setup) { bend(setup.device, 1020.0); }},
+          {std::string(finer_encoder), [](TouchSetup& setup) { setup.wall.count_length = 5.5e-6; }},
+          {"1 kHz", [](TouchSetup& setup) { setup.wall.tick_rate = 1000.0; }}};
 }
 
 /// Whatever it comes to.
@@ -125,6 +129,24 @@ std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const Stiffn
   return results;
 }
 
+namespace {
+/// What the count takes from the walls that grow.
+std::string finer_encoder_words(const std::vector<GrowingResult>& walls) {
+  const std::vector<LoopSetting> situations = growing_situations();
+  const auto at = static_cast<std::size_t>(std::ranges::find(situations, finer_encoder, &LoopSetting::name) -
+                                           situations.begin());
+  const auto best = std::ranges::max_element(
+      walls, {}, [at](const GrowingResult& wall) { return wall.situations[at].both.mean; });
+  const PeopleMean& most = best->situations[at].both;
+  const double plain = walls.front().situations[at].both.mean;
+  return fmt::format(
+      "What bounds them is the count: a handle that rests at the edge of one shakes the wall out of its "
+      "calm. With {} the wall that {} holds {}{} N/mm, {}{:.1f} times the plain wall with that encoder.",
+      finer_encoder, best->wall, most.ends.beyond_last > 0 ? "more than " : "", n_per_mm(most.mean),
+      most.ends.beyond_last > 0 ? "more than " : "", plain > 0.0 ? most.mean / plain : 0.0);
+}
+}  // namespace
+
 report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls,
                                 const std::vector<SeemingResult>& seeming) {
   report::Section section{
@@ -134,8 +156,7 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       {}};
   report::Table table{
       "Largest stiffness, N/mm, held by both criteria, mean of the people with its 95 % interval (of the "
-      "plain "
-      "wall's)",
+      "plain wall's)",
       {"wall"},
       {}};
   for (const LoopSetting& situation : growing_situations()) table.columns.push_back(situation.name);
@@ -157,7 +178,8 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
   }
   report::Table seems{
       "The same walls where nobody asks what they come to: the largest stiffness that is stable by both "
-      "criteria, N/mm, and what is rendered of it in the judged second, mean of all touches",
+      "criteria, N/mm, and what is rendered of it in the hold's last quarter of a second, mean of all "
+      "touches",
       {"wall", "calm by", "set to", "rendered, %", "rendered, N/mm"},
       {}};
   for (const SeemingResult& one : seeming)
@@ -168,26 +190,21 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
   section.paragraphs = {
       fmt::format(
           "A wall with wall.touch_stiffness meets the handle with that, and grows to wall.stiffness while "
-          "the "
-          "handle is slower than wall.calm_velocity (0.01 m/s), by the firmware's default estimator. Its "
-          "damper "
-          "takes the difference over one sample (wall.damping_window = 1). No field, so nothing is felt at "
-          "rest "
-          "in front of it. It counts as held only if it is stable and comes to {:g} % of its stiffness in "
-          "the hold's last quarter of a second. Pulses push the hand with 1.5 N "
-          "into the wall and then out of it, for 20 ms each, 1.9 and 2.05 s after the contact.",
+          "the handle is slower than wall.calm_velocity (0.01 m/s), by the firmware's default estimator. Its "
+          "damper takes the difference over one sample (wall.damping_window = 1). No field, so nothing is "
+          "felt at rest in front of it. It counts as held only if it is stable and comes to {:g} % of its "
+          "stiffness in the hold's last quarter of a second. Pulses push the hand with 1.5 N into the wall "
+          "and then out of it, for 20 ms each, 1.9 and 2.05 s after the contact. In steps of 3 %.",
           100.0 * TouchSetup().least_rendered_share),
       fmt::format("Best where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
                   best->wall, n_per_mm(best->situations.front().both.mean),
                   best->situations.front().both.mean / walls.front().situations.front().both.mean),
       "Why it is asked: near its limit such a wall takes back what it has grown at each count that the "
-      "handle goes "
-      "on, and can be set far higher without ever oscillating or getting there, the more so the sooner a "
-      "motion is "
-      "noticed. The second table says what such a wall really is.",
+      "handle goes on, and can be set far higher without ever oscillating or getting there, the more so the "
+      "sooner a motion is noticed. The second table says what such a wall really is.",
+      finer_encoder_words(walls),
       "It is paid for at the contact: a tap meets the touch stiffness and the damper, and the stiffness "
-      "comes "
-      "within three growth times. The rate-hardness above says how hard the contact itself is."};
+      "comes within three growth times. The rate-hardness above says how hard the contact itself is."};
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;
 }
@@ -303,12 +320,10 @@ report::Section drawn_section(const std::vector<DrawnResult>& results) {
           "{:g} of what the plain wall allows, in {:g} s, with a damper of {:g} m/T over one sample.",
           results.size(), GrowthRule().touch_share, GrowthRule().growth_time, GrowthRule().damping_share),
       fmt::format("By both criteria at least three times the plain wall: {} of {} (of all such devices "
-                  "{:.0f} to {:.0f} %, "
-                  "with 95 %); softer than the plain wall: {}; smallest ratio {:.2f}, median {:.2f}, largest "
-                  "{:.2f}. Three "
-                  "times the plain wall would be more than one count at 1 N (18.2 N/mm) on {} of them, {} of "
-                  "which are "
-                  "tripled all the same: a handle at rest swings by no count.",
+                  "{:.0f} to {:.0f} %, with 95 %); softer than the plain wall: {}; smallest ratio {:.2f}, "
+                  "median {:.2f}, largest {:.2f}. Three times the plain wall would be more than one count at "
+                  "1 N (18.2 N/mm) on {} of them, {} of which are tripled all the same: a handle at rest "
+                  "swings by no count.",
                   tripled, results.size(), 100.0 * share.low, 100.0 * share.high, softer, ratios.front(),
                   ratios[ratios.size() / 2], ratios.back(), coarse, coarse_tripled),
       fmt::format("Deeper in than the plain wall at that wall's own largest stiffness: {} of {}.", deeper,
@@ -318,6 +333,7 @@ report::Section drawn_section(const std::vector<DrawnResult>& results) {
 
 std::vector<report::Section> growing_walls(const StudyInput& input) {
   StiffnessRun run = input.run;
+  run.steps.growth = 0.03;
   const SubjectSet& set = input.sets.front();
   StiffnessRun drawn_run = run;
   drawn_run.protocol.approach_speeds = {0.1, 0.5, 1.0};

@@ -160,10 +160,9 @@ report::Section held_wall_section(const SubjectSet& set, const std::vector<HeldW
       fmt::format("A wall of {:g} N/mm held (paper 1, Figs. 9 to 12; {})", held / 1e3,
                   experiment::clip_words(set.device)),
       {implied ? fmt::format(
-                     "No number was fitted to these verdicts, but {} N/mm lies between the two means "
-                     "that were: {} N/mm without a field, {} N/mm with 2 N. Figs. 9 and 11 are implied "
-                     "by that fit and test nothing; Figs. 10 and 12 do. V x 13.3 was chosen because it "
-                     "brings Fig. "
+                     "No number was fitted to these verdicts, but {} N/mm lies between the two means that "
+                     "were: {} N/mm without a field, {} N/mm with 2 N. Figs. 9 and 11 are implied by that "
+                     "fit and test nothing; Figs. 10 and 12 do. V x 13.3 was chosen because it brings Fig. "
                      "8's mean near the paper's, so its rows test little.",
                      held / 1e3, n_per_mm(set.fitted->plain_target), n_per_mm(set.fitted->magnetic_target))
                : std::string("Nothing was fitted to these people with this device.")},

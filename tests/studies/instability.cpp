@@ -18,7 +18,7 @@ using Detector = control::InstabilityDetector<float>;
 using Softening = control::WallSoftening<float>;
 using Loop = control::HapticLoop<float>;
 
-constexpr double oscillation = 0.165e-3;  // m peak to peak, contact_measure.hpp
+constexpr double oscillation = simulation::unstable_motion;
 constexpr double longest_period = 1.0 / 15.0;
 constexpr double in_time = 0.3;  // s
 constexpr double two_pi = 6.283185307179586;
@@ -346,13 +346,11 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
                               double margin) {
   report::Section found{"Unstable walls", {}, {}, {}};
   found.paragraphs.push_back(
-      "Walls that are stiffer than the largest stable stiffness of each simulated person with each law "
-      "(500 Hz, 0.055 mm), touched at 0.05 to 1 m/s with 0.3 to 1 N, counted where contact_measure.hpp calls "
-      "the held contact unstable. The onset is the first of the swings of more than 0.165 mm that follow "
-      "each "
+      "Walls that are stiffer than the largest stable stiffness of each simulated person with each law (500 "
+      "Hz, 0.055 mm), touched at 0.05 to 1 m/s with 0.3 to 1 N, counted where contact_measure.hpp calls the "
+      "held contact unstable. The onset is the first of the swings of more than 0.165 mm that follow each "
       "other for half a second; where there is none, the oscillation comes and goes around what counts as "
-      "one "
-      "at all, and no time can be given.");
+      "one at all, and no time can be given.");
   report::Table found_table{
       "",
       {"stiffness / largest stable", "unstable touches", "with an onset", "found within 0.3 s", "share",
@@ -361,8 +359,7 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
   report::Section soft{"Softening", {}, {}, {}};
   soft.paragraphs.push_back(
       "The same touches, with the wall's force halved for every 0.1 s that the alarm lasts. Ended: no swing "
-      "of "
-      "more than 0.165 mm in the last half second of the hold.");
+      "of more than 0.165 mm in the last half second of the hold.");
   report::Table soft_table{"",
                            {"stiffness / largest stable", "softened touches", "ended",
                             "alarm to end, median (s)", "95 % (s)", "factor left, median", "5 %"},
@@ -370,22 +367,18 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
   report::Section calm{"Stable touches", {}, {}, {}};
   calm.paragraphs.push_back(
       fmt::format("Walls of at most {:g} of the stiffness of a plain wall that is stable (less than 1 N peak "
-                  "to peak) under the "
-                  "same hand in the same loop, the slope of a field included: 500 Hz to 20 kHz, "
-                  "encoders of 55, 23 and 5.5 um, resolutions of 0.1 and 0.4 mm, all laws, no damping or 0.5 "
-                  "to 3 N s/m, all velocity "
-                  "estimators; taps, presses that are let go of, holds, at 0.02 to 1.5 m/s with 0.2 to 1.5 "
-                  "N; half of them with "
-                  "a hand that trembles at 8 to 12 Hz or presses more and less at 0.5 to 3 Hz; and handles "
-                  "that nobody holds, "
-                  "thrown at 0.02 to 3 m/s with their weight on them. {} alarms in {} touches and {} "
-                  "throws ({} touches "
-                  "left out that were not stable).",
+                  "to peak) under the same hand in the same loop, the slope of a field included: 500 Hz to "
+                  "20 kHz, encoders of 55, 23 and 5.5 um, resolutions of 0.1 and 0.4 mm, all laws, no "
+                  "damping or 0.5 to 3 N s/m, all velocity estimators; taps, presses that are let go of, "
+                  "holds, at 0.02 to 1.5 m/s with 0.2 to 1.5 N; half of them with a hand that trembles at 8 "
+                  "to 12 Hz or presses more and less at 0.5 to 3 Hz; and handles that nobody holds, thrown "
+                  "at 0.02 to 3 m/s with their weight on them. {} alarms in {} touches and {} throws ({} "
+                  "touches left out that were not stable).",
                   margin, stable.alarms, stable.touches, stable.throws, stable.not_stable));
   calm.paragraphs.push_back(
       "Nearer to the limit a stable wall rings after a hard touch, and may ring for longer than anybody "
-      "wants to "
-      "wait for a verdict. How often that is called unstable (500 Hz, 0.055 mm, the touches of above):");
+      "wants to wait for a verdict. How often that is called unstable (500 Hz, 0.055 mm, the touches of "
+      "above):");
   report::Table calm_table{"", {"stiffness / largest stable", "stable touches", "alarms", "share"}, {}};
   const auto percent = [](std::size_t part, std::size_t all) {
     return all == 0 ? std::string("-")
@@ -416,8 +409,7 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
     }
   }
   found.paragraphs.push_back(fmt::format(
-      "Of all {} touches with an onset, {} are found within 0.3 s of it, {}: {} of all {} unstable "
-      "ones.",
+      "Of all {} touches with an onset, {} are found within 0.3 s of it, {}: {} of all {} unstable ones.",
       all.steady, all.found_in_time, percent(all.found_in_time, all.steady),
       percent(all.found_in_time, all.unstable), all.unstable));
   found.tables.push_back(std::move(found_table));
@@ -431,12 +423,11 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
            "wall unstable that makes the handle swing by at least {:g} mm and the force by at least {:g} N "
            "(amplitudes), faster than {:g} Hz, without dying down within spans of {:g} ms. Unstable walls of "
            "simulated people oscillate at 30 to 70 Hz, by half a millimetre and more; a hand trembles at 8 "
-           "to "
-           "12 Hz.",
+           "to 12 Hz.",
            1e3 * static_cast<double>(defaults.displacement_threshold), defaults.force_threshold,
            defaults.lowest_frequency, 1e3 * static_cast<double>(defaults.settling_time)),
-       "Everything here is simulated. Made by "
-       "build/native/tests/studies/kmax-studies instability --out docs."},
+       "Everything here is simulated. Made by build/native/tests/studies/kmax-studies instability --out "
+       "docs."},
       {},
       {}};
   return {"Instability detector", {what, found, calm, soft}};

@@ -107,8 +107,7 @@ std::string strongest_words(const std::vector<RateResult>& results) {
     if (walls == 0) continue;
     words += fmt::format(
         "{}With {:g} um {} of {} walls without delay hold {:g} N/mm at {:g} kHz by the position and {} by "
-        "both "
-        "criteria, the stiffest of them {:.3g} N/mm; at {:g} Hz {}, the stiffest {:.3g}.",
+        "both criteria, the stiffest of them {:.3g} N/mm; at {:g} Hz {}, the stiffest {:.3g}.",
         words.empty() ? "" : " ", encoder * 1e6, still, walls, held / 1e3, study_rates.back() / 1e3, by_each,
         most / 1e3, study_rates.front(), at_first == 0 ? "none does" : std::to_string(at_first),
         most_at_first / 1e3);
@@ -126,8 +125,7 @@ report::Section rate_section(const std::vector<RateResult>& results) {
       "One person, force not clipped, steps of 3 %. Unstable is what moves by more than three counts of the "
       "encoder peak to peak in the first table of each encoder, and what swings by more than 1 N in the "
       "second: one count is that much at 1 N / count length, so what flickers between two counts ends there, "
-      "at any "
-      "rate.");
+      "at any rate.");
   std::vector<double> encoders;
   for (const RateResult& result : results) encoders.push_back(result.setting.count_length);
   std::sort(encoders.begin(), encoders.end(), std::greater<>());

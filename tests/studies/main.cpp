@@ -142,9 +142,9 @@ int run(int count, char** arguments) {
       page.sections.push_back(experiment::provenance_section(provenance));
       page.sections.back().paragraphs.insert(page.sections.back().paragraphs.begin() + 1,
                                              "What each of the people can have under each wall, by each "
-                                             "criterion, lies behind these means: 'scripts/experiments "
-                                             "--raw DIR max-stiffness' keeps it in DIR as raw_STUDY.csv. It "
-                                             "is too large to lie beside this page.");
+                                             "criterion, lies behind these means: 'scripts/experiments --raw "
+                                             "DIR max-stiffness' keeps it in DIR as raw_STUDY.csv. It is too "
+                                             "large to lie beside this page.");
     }
     report::write_page(page, input.folder, "max_stiffness");
     raw.write(input.folder);

@@ -6,7 +6,7 @@
 namespace kmax::link {
 
 namespace {
-const char* words_of_controller(std::uint8_t state) {
+const char* controller_text(std::uint8_t state) {
   if ((state & (CAN_ERR_CRTL_TX_PASSIVE | CAN_ERR_CRTL_RX_PASSIVE)) != 0)
     return "the controller is error passive (more than 127 errors)";
   if ((state & (CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_RX_WARNING)) != 0)
@@ -16,7 +16,7 @@ const char* words_of_controller(std::uint8_t state) {
   return "the controller changed its error state";
 }
 
-const char* words_of_violation(std::uint8_t kind) {
+const char* violation_text(std::uint8_t kind) {
   if ((kind & CAN_ERR_PROT_STUFF) != 0) return "bit stuffing is violated";
   if ((kind & CAN_ERR_PROT_FORM) != 0) return "frames have a wrong form";
   if ((kind & (CAN_ERR_PROT_BIT | CAN_ERR_PROT_BIT0 | CAN_ERR_PROT_BIT1)) != 0)
@@ -81,9 +81,9 @@ std::string CanFaults::words(const std::string& interface) const {
   if ((classes_ & CAN_ERR_TRX) != 0)
     return fmt::format("the transceiver reports a fault of its lines ({}); check the wiring", counted);
   if ((classes_ & CAN_ERR_PROT) != 0)
-    return fmt::format("{} ({}); {}", words_of_violation(violation_), counted, check_wires);
+    return fmt::format("{} ({}); {}", violation_text(violation_), counted, check_wires);
   if ((classes_ & CAN_ERR_CRTL) != 0)
-    return fmt::format("{} ({}); {}", words_of_controller(controller_), counted, check_wires);
+    return fmt::format("{} ({}); {}", controller_text(controller_), counted, check_wires);
   if ((classes_ & CAN_ERR_TX_TIMEOUT) != 0)
     return fmt::format("the driver could not send in time ({}); {}", counted, check_wires);
   if ((classes_ & (CAN_ERR_BUSERROR)) != 0)

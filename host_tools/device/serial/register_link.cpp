@@ -17,7 +17,7 @@ using device::Parameter;
 using device::Table;
 
 namespace {
-const char* words_of_exception(std::uint8_t exception) {
+const char* exception_text(std::uint8_t exception) {
   constexpr const char* words[] = {"for a reason this program does not know",
                                    "it does not know this function",
                                    "there is no such register, or it cannot be written",
@@ -43,7 +43,7 @@ std::vector<std::uint32_t> joined(std::span<const std::uint16_t> registers) {
 
 RegisterRefused::RegisterRefused(std::uint8_t exception, std::uint8_t function, std::uint16_t address)
     : RefusedError(fmt::format("the device refused function {} at register 0x{:04X}: {} (exception {})",
-                               function, address, words_of_exception(exception), exception)),
+                               function, address, exception_text(exception), exception)),
       exception_(exception),
       function_(function),
       address_(address) {}

@@ -31,11 +31,11 @@ struct ContactCondition {
 std::vector<ContactCondition> contact_conditions();
 
 struct ContactSettings {
-  double stiffness = paper::contact_stiffness;  ///< N/m
-  double haptic_rate = paper::update_rate;      ///< Hz
-  double hold_time = 3.0;                       ///< s from the first touch; the last second is judged
-  double threshold = 0.165e-3;                  ///< m peak to peak, contact_measure.hpp
-  TouchChanges changes{};                       ///< of every touch but haptic.rate, which is above
+  double stiffness = paper::contact_stiffness;     ///< N/m
+  double haptic_rate = paper::update_rate;         ///< Hz
+  double hold_time = 3.0;                          ///< s from the first touch; the last second is judged
+  double threshold = simulation::unstable_motion;  ///< m peak to peak
+  TouchChanges changes{};                          ///< of every touch but haptic.rate, which is above
 
   /// The wall that the paper's verdicts are of: its stiffness at its rate, and nothing changed.
   bool papers_wall() const {

@@ -61,13 +61,11 @@ std::string nothing_found_words(const DesignTask& task, const WallDesign& design
   if (design.least_depth > 0.0)
     return fmt::format(
         "No wall holds that lets nobody deeper in than {:g} mm: the least found is {:.3g} mm. Allow more "
-        "with "
-        "--depth, take off a smaller --margin, or leave --depth out.",
+        "with --depth, take off a smaller --margin, or leave --depth out.",
         *task.depth * 1e3, design.least_depth * 1e3);
   return fmt::format(
-      "No wall of {:g} N/m or more holds for all of {}. Allow more with "
-      "--moves or --feels, or look for a faster loop (--rate), a finer encoder (--encoder) or a shorter "
-      "delay.",
+      "No wall of {:g} N/m or more holds for all of {}. Allow more with --moves or --feels, or look for a "
+      "faster loop (--rate), a finer encoder (--encoder) or a shorter delay.",
       first_rung, people_words(task.set.subjects.size()));
 }
 

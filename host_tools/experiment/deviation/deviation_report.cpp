@@ -56,10 +56,10 @@ DeviationStudy study_deviation(const DeviationSettings& settings, const Simulate
   for (const DeviationResult& result : study.results) contact = std::min(contact, result.contact_share);
   study.circumstances = fmt::format(
       "Simulated: {}, wall of {:g} N/mm at {:g} Hz, push {:g} N, {} pulses of {:g} s without and {} with "
-      "F_B, {:g} s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch.",
+      "F_B, {:g} s for the arm to adjust; the force is {}. In contact for at least {:.2f} % of a touch. {}",
       people_words(people.size()), protocol.stiffness / 1000, protocol.haptic_rate, hands.push,
       protocol.pulses, protocol.pulse_on, protocol.pulses, protocol.rest, clipping_words(hands.device),
-      100 * contact);
+      100 * contact, model_words(hands.device, people.front()));
   return study;
 }
 

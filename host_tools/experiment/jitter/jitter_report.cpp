@@ -66,10 +66,10 @@ JitterStudy study_jitter(const JitterSettings& settings, const SimulatedHands& h
   study.without = record(0.0);
   study.with = record(3.0);
   study.circumstances = fmt::format(
-      "Simulated: {}, {} each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force is {}.",
+      "Simulated: {}, {} each, wall of {:g} N/mm at {:g} Hz, push {:g} N at {:g} m/s; the force is {}. {}",
       people_words(people.size()), touch_words(static_cast<std::size_t>(settings.touches)),
       settings.wall.stiffness / 1000, settings.wall.haptic_rate, hands.push, hands.approach_speed,
-      clipping_words(hands.device));
+      clipping_words(hands.device), model_words(hands.device, people.front()));
   return study;
 }
 

@@ -21,8 +21,7 @@ void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
         steps.last >= std::max(steps.first, first_adaptive) && steps.last <= 1e7))
     throw std::invalid_argument(
         fmt::format("stiffness from {} N/m (adaptive {}) by {} N/m (or {} of it) to {} N/m: allowed are "
-                    "steps above 0 and "
-                    "an end from the first one to 1e7 N/m",
+                    "steps above 0 and an end from the first one to 1e7 N/m",
                     steps.first, first_adaptive, steps.step, steps.growth, steps.last));
 }
 

@@ -21,8 +21,8 @@ struct TouchProtocol {
   // Each of them so often, begun a share of a sample's way further out each time: near the limit it hangs on
   // where between two samples the handle meets the surface.
   std::size_t phases = 1;
-  double threshold = 0.165e-3;   // m peak to peak: contact_measure.hpp
-  double force_threshold = 0.0;  // N: simulated_touch.hpp
+  double threshold = simulation::unstable_motion;  // m peak to peak
+  double force_threshold = 0.0;                    // N: simulated_touch.hpp
   std::size_t touches() const { return approach_speeds.size() * pushes.size() * phases; }
   // By the force if there is a threshold for it, else by the position.
   TouchJudgement judgement() const {

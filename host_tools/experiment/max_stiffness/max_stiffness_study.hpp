@@ -81,8 +81,8 @@ MaxStiffnessStudy run_max_stiffness_study(const SubjectSet& set,
                                           const StiffnessRun& run);
 
 double mean_stiffness(std::span<const MaxStiffness> results);  // N/m
-// N/m: the mean of all such people lies within this of the sample's with 95 % (Student); 0 for fewer than two.
-// A search that ended before somebody's largest stiffness makes mean and interval too low.
+// N/m: the mean of all such people lies within this of the sample's with 95 % (Student); 0 for fewer than
+// two. A search that ended before somebody's largest stiffness makes mean and interval too low.
 double mean_interval(std::span<const MaxStiffness> results);
 
 // People whose number in a mean is only a bound.

@@ -37,6 +37,7 @@
 #include "host_tools/experiment/simulated_rig.hpp"
 #include "host_tools/experiment/tested_claim.hpp"
 #include "host_tools/report/page.hpp"
+#include "host_tools/simulation/contact_measure.hpp"
 
 namespace kmax::experiment {
 
@@ -44,7 +45,7 @@ struct ResolutionWall {
   double stiffness = paper::resolution_stiffness;  ///< N/m
   double haptic_rate = 1000.0;                     ///< Hz; not in the paper
   double hold = 3.0;                               ///< s from the touch; the last second is judged
-  double threshold = 0.165e-3;                     ///< m peak to peak, contact_measure.hpp
+  double threshold = simulation::unstable_motion;  ///< m peak to peak
   control::Rounding rounding = control::Rounding::nearest;
   bool operator==(const ResolutionWall&) const = default;
 };

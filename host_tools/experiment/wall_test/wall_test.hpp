@@ -57,14 +57,14 @@ std::string_view to_string(StabilityCriterion criterion);
 struct WallTestSettings {
   std::vector<double> stiffnesses{1e3, 2e3, 3e3, 4e3, 5e3, 6e3};  ///< N/m, rising
   std::size_t repeats = 3;                                        ///< touches of each kind at each stiffness
-  double hold_time = 3.0;          ///< s from the first touch, 2 at least; the last second is judged
-  double threshold = 0.165e-3;     ///< m peak to peak
-  double force_threshold = 1.0;    ///< N peak to peak
-  double slow = 0.05, fast = 0.5;  ///< m/s, intended
-  double usual = 0.2;              ///< m/s, of the other two kinds
-  double pulse_force = 1.5;        ///< N
-  double pulse_time = 0.02;        ///< s, of each half
-  TouchChanges changes{};          ///< of every touch
+  double hold_time = 3.0;  ///< s from the first touch, 2 at least; the last second is judged
+  double threshold = simulation::unstable_motion;  ///< m peak to peak
+  double force_threshold = 1.0;                    ///< N peak to peak
+  double slow = 0.05, fast = 0.5;                  ///< m/s, intended
+  double usual = 0.2;                              ///< m/s, of the other two kinds
+  double pulse_force = 1.5;                        ///< N
+  double pulse_time = 0.02;                        ///< s, of each half
+  TouchChanges changes{};                          ///< of every touch
 
   /// s from the first touch, of the pulse and of letting go.
   double event_time() const { return hold_time - 1.5; }
@@ -171,6 +171,7 @@ struct WallTestResult {
   WallTestSettings settings;
   double haptic_rate = 0.0;  ///< Hz
   std::string law;           ///< the wall's, as the parameter names it
+  bool grows = false;        ///< it meets the handle softer (wall.touch_stiffness)
   std::vector<WallTouch> touches;
   std::vector<WallCell> cells;
   report::Origin origin = report::Origin::predicted;

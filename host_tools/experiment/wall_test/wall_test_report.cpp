@@ -96,14 +96,14 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
   const WallTestSettings& settings = result.settings;
   std::vector<std::string> words = {
       fmt::format(
-          "Wall of law '{}' at {:g} Hz, touched at each stiffness in {} ways, {} each: slow (intended "
-          "{:g} m/s), fast ({:g} m/s), with a pulse, and let go. It is held for {:g} s.",
+          "Wall of law '{}' at {:g} Hz, touched at each stiffness in {} ways, {} each: slow (intended {:g} "
+          "m/s), fast ({:g} m/s), with a pulse, and let go. It is held for {:g} s.",
           result.law, result.haptic_rate, touch_kinds.size(), touch_words(settings.repeats), settings.slow,
           settings.fast, settings.hold_time),
       fmt::format(
-          "Pulse: {:g} s after the touch the device adds +{:g} N and then -{:g} N to the wall's force, "
-          "for {:g} ms each or as long as its link takes{}. Let go: the hand opens at that time; a "
-          "handle that has left the wall then and stands still outside counts as stable.",
+          "Pulse: {:g} s after the touch the device adds +{:g} N and then -{:g} N to the wall's force, for "
+          "{:g} ms each or as long as its link takes{}. Let go: the hand opens at that time; a handle that "
+          "has left the wall then and stands still outside counts as stable.",
           settings.event_time(), settings.pulse_force, settings.pulse_force, settings.pulse_time * 1e3,
           [&] {
             double longest = 0.0;
@@ -112,15 +112,18 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
             return longest > 0.0 ? fmt::format(" ({:.0f} ms at most here)", longest * 1e3) : std::string();
           }()),
       fmt::format(
-          "Unstable by position: more than {:g} mm peak to peak in every quarter of the last second "
-          "of the hold; by force: more than {:g} N. Neither paper gives a measure: the first is three "
-          "counts of paper 1's device, the second our own choice, since a stiff wall swings by newtons "
-          "while it moves by less than that. "
-          "A touch is stable if it is by both.",
+          "Unstable by position: more than {:g} mm peak to peak in every quarter of the last second of the "
+          "hold; by force: more than {:g} N. Neither paper gives a measure: the first is three counts of "
+          "paper 1's device, the second our own choice, since a stiff wall swings by newtons while it moves "
+          "by less than that. A touch is stable if it is by both.",
           settings.threshold * 1e3, settings.force_threshold)};
   words.emplace_back(
       "The trace has at most 500 records a second and whole counts of the encoder, and the force has its "
       "limit: rate-hardness is what these let pass of the stiffness.");
+  if (result.grows)
+    words.emplace_back(
+        "The wall grows from wall.touch_stiffness: stable means here that it does not oscillate, not that it "
+        "comes to its stiffness. Force over depth at the end of a touch's samples says what it has come to.");
   if (!settings.changes.empty()) words.push_back(settings.changes.sentence());
   return words;
 }

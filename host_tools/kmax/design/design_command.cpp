@@ -40,8 +40,8 @@ struct DesignWallOptions {
   void declare(CLI::App& command) {
     command
         .add_option("--device", device,
-                    "The device's numbers: a file of 'kmax dump', after 'kmax calibrate'; else "
-                    "those of the people's set")
+                    "The device's numbers: a file of 'kmax dump', after 'kmax calibrate'; else those of the "
+                    "people's set")
         ->type_name("FILE");
     add_quantity(command, "--mass", mass, "kg", "Mass at the handle, kg", 1e-4, 100.0);
     add_quantity(command, "--friction", friction, "N", "Coulomb friction at the handle, N", 0.0, 1000.0);

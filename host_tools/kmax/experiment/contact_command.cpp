@@ -6,6 +6,7 @@
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/terminal_text.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/json/value_json.hpp"
 #include "host_tools/kmax/commands.hpp"
 #include "host_tools/kmax/experiment/experiment_study.hpp"
@@ -93,9 +94,13 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
         });
         return rig.velocity_estimator();
       });
-  const auto words = experiment::contact_words(
+  auto words = experiment::contact_words(
       settings, trials, velocity_estimator,
       context.simulated() ? settings.changes.simulated_device().axes[0].motion : std::nullopt);
+  if (context.simulated()) {
+    const simulation::SceneAxis axis = settings.changes.simulated_device().axes[0];
+    if (axis.person) words.push_back(experiment::model_words(axis.device, *axis.person));
+  }
   std::vector<std::filesystem::path> files, pictures;
   if (!options.files.folder.empty()) {
     for (const experiment::ContactResult& result : results) {

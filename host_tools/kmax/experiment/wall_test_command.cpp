@@ -142,6 +142,7 @@ void describe_wall(device::Device& device, std::size_t axis, WallTestResult& res
   const device::Parameter law = device::resolve(name("wall.law"));
   result.law = device::value_text(law, device.read(law));
   result.haptic_rate = device.read_number(name("haptic.rate"));
+  result.grows = device.read_number(name("wall.touch_stiffness")) > 0.0;
   if (result.law == "none")
     throw UsageError(fmt::format(
         "wall.law of axis {} is none: there is no wall to test; set one, or give --set wall.law=plain",
@@ -261,8 +262,7 @@ void add_wall_test_experiment(CLI::App& experiment, Context& context) {
        "On a device each touch is asked for before it is made. The axis is disarmed after each touch and on "
        "Ctrl-C, and its parameters are put back at the end.\n"
        "Every number that is compared needs its interval: 3 stable touches of 3 say no more than that at "
-       "least "
-       "44 % are."},
+       "least 44 % are."},
       Takes::device_and_axis, run_wall_test);
 }
 

@@ -179,7 +179,6 @@ class VirtualBoard {
   AdvancedTimerModel& pwm(std::size_t axis) { return pwm_[axis]; }
   GeneralTimerModel& encoder_timer(std::size_t axis) { return encoders_[axis]; }
   AdcModel& adc() { return adc_; }
-  DbgmcuModel& debug_support() { return dbgmcu_; }
   DmaModel& dma() { return dma2_; }
   const As5047pChip& serial_encoder() const { return serial_encoder_; }
   Drv8301Chip& gate_driver(std::size_t axis) { return gate_drivers_[axis]; }

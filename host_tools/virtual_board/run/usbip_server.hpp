@@ -18,7 +18,6 @@ namespace kmax::virtual_board {
 /// it. The cable is plugged in while a client is connected, and pulled when the last one has gone.
 class UsbipServer {
  public:
-  static constexpr std::uint16_t usual_port = 3240;
   static constexpr std::size_t most_clients = 8;
 
   /// Listens at 127.0.0.1:`port`; 0 takes one that is free. `say` gets what clients do wrong. Throws

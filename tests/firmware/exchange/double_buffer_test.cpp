@@ -39,7 +39,7 @@ struct Interrupted {
   }
 };
 
-class HandoverTest : public testing::Test {
+class DoubleBufferTest : public testing::Test {
  protected:
   void TearDown() override {
     Interrupted::interrupt = nullptr;
@@ -47,7 +47,7 @@ class HandoverTest : public testing::Test {
   }
 };
 
-TEST_F(HandoverTest, StartsWithTheInitialValueTaken) {
+TEST_F(DoubleBufferTest, StartsWithTheInitialValueTaken) {
   DoubleBuffer<int> handover(7);
   EXPECT_TRUE(handover.taken());
   EXPECT_EQ(handover.ISR_take(), 7);
@@ -58,7 +58,7 @@ TEST_F(HandoverTest, StartsWithTheInitialValueTaken) {
   EXPECT_EQ(handover.ISR_take(), 8);
 }
 
-TEST_F(HandoverTest, LastOfSeveralOffersWins) {
+TEST_F(DoubleBufferTest, LastOfSeveralOffersWins) {
   DoubleBuffer<int> handover(0);
   for (int i = 1; i <= 5; ++i) handover.offer(i);
   EXPECT_FALSE(handover.taken());
@@ -68,7 +68,7 @@ TEST_F(HandoverTest, LastOfSeveralOffersWins) {
   EXPECT_EQ(handover.ISR_take(), 7);
 }
 
-TEST_F(HandoverTest, InterruptAtEveryPointOfEveryOfferSeesAWholeValueOldOrNew) {
+TEST_F(DoubleBufferTest, InterruptAtEveryPointOfEveryOfferSeesAWholeValueOldOrNew) {
   // Also with an offer that still waits: it may be withdrawn, never torn.
   for (int point = 0; point <= static_cast<int>(Interrupted::pieces); ++point) {
     for (const bool one_waits : {false, true}) {

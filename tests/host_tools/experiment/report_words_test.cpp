@@ -48,4 +48,9 @@ TEST(ReportWords, TheStiffeningIsTheCauseOnlyOfWhatFallsWithItAndNotWithoutIt) {
     EXPECT_NE(cause_words("it", falls, falls_without).find("nothing to compare with"), std::string::npos);
 }
 
+TEST(ModelWords, NameWhatDecidesHowStiffAWallCanBe) {
+  EXPECT_EQ(model_words({.mass = 0.05, .friction = 0.1}, {.activation_gain = 0.4}),
+            "The handle has 50 g and 0.1 N of friction, the hand's gamma is 0.4 /N.");
+}
+
 }  // namespace kmax::experiment::report_words_test

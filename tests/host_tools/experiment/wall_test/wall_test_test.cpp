@@ -1,5 +1,6 @@
 #include "host_tools/experiment/wall_test/wall_test.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -391,6 +392,14 @@ TEST(WallTestReport, PageHasCriteriaLimitsPictureAndOrigin) {
   EXPECT_EQ(trace.column("time_s").size(), result.touches[0].samples.size());
   EXPECT_EQ(trace.column("stiffness_n_per_m").front(), 1000.0);
   EXPECT_CONTAINS(folder.read("new/wall_test_touches.csv"), "3000,slow,3,1,0,");
+}
+
+TEST(WallTestReport, SaysOfAWallThatGrowsWhatStableDoesNot) {
+  WallTestResult result = result_of(touches_up_to(3e3, 2e3));
+  const auto words = [&] { return fmt::format("{}", fmt::join(wall_test_words(result), " ")); };
+  EXPECT_EQ(words().find("grows"), std::string::npos);
+  result.grows = true;
+  EXPECT_CONTAINS(words(), "not that it comes to its stiffness");
 }
 
 }  // namespace kmax::experiment::wall_test_test
