@@ -18,11 +18,11 @@ struct GrowingStiffnessConfig {
 ///   inside, |w| > calm        back towards K_touch, four times as fast
 ///
 /// Why: what makes a stiff wall oscillate is the first hit, which a handle brings with all of its speed. Once
-/// it has come to rest, friction holds it there against a far stiffer spring (Diolaiti, Niemeyer, Barbagli,
-/// Salisbury 2006: the quiet region). The spring grows too slowly to be felt as motion; the work that it
-/// does on the hand meanwhile is (K - K_touch) d^2 / 2 for a handle that stays at depth d. What it allows and
-/// costs: docs/experiments/max_stiffness.md. At the moment of contact the wall is no harder than K_touch,
-/// and that is what a tap feels.
+/// it has come to rest within one count, friction holds it there against a far stiffer spring (Diolaiti,
+/// Niemeyer, Barbagli, Salisbury 2006: the quiet region). The spring grows too slowly to be felt as motion;
+/// the work that it does on the hand meanwhile is (K - K_touch) d^2 / 2 for a handle that stays at depth d.
+/// What it allows and costs: docs/experiments/max_stiffness.md. At the moment of contact the wall is no
+/// harder than K_touch, and that is what a tap feels.
 ///
 /// A wall that looks stable may be one that never comes to K: where each count that the encoder goes on is
 /// not calm, it stays near the stiffness at which the handle would begin to oscillate. present() says what

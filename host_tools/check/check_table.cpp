@@ -150,7 +150,8 @@ std::string conclusion(const Judgement& judgement, std::size_t width) {
   if (judgement.grows)
     text +=
         "All of wall.stiffness is judged, which this wall grows to from wall.touch_stiffness, as long as the "
-        "contact is calm: it may hold where the same stiffness at once does not. ";
+        "contact is calm: it may hold where the same stiffness at once does not, or stay softer without "
+        "oscillating. ";
   if (judgement.follows_velocity) text += "Not judged: how the adaptive law's field follows the velocity. ";
   text.pop_back();
   return "\n" + wrapped(text, "", width);

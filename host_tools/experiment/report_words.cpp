@@ -50,6 +50,12 @@ std::string estimator_name(control::VelocityEstimatorKind estimator) {
   return device::value_text(kinds, static_cast<std::uint32_t>(estimator));
 }
 
+std::string growing_wall_words() {
+  return "The wall grows from wall.touch_stiffness: stable means here that it does not oscillate, not that "
+         "it comes to its stiffness. Force over depth at the end of a touch's samples says what it has come "
+         "to.";
+}
+
 std::string clipping_words(const simulation::DeviceModel& device) {
   return device.force_limit > 0.0 ? fmt::format("clipped at {:g} N", device.force_limit)
                                   : std::string("not clipped");

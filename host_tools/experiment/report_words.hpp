@@ -39,6 +39,9 @@ std::string cause_words(std::string_view number, const TestedClaim& falls, const
 /// As the parameter velocity.estimator has it.
 std::string estimator_name(control::VelocityEstimatorKind estimator);
 
+/// Two sentences on what a device's verdict does not say of a wall with wall.touch_stiffness.
+std::string growing_wall_words();
+
 /// What the simulated device makes of a force: "clipped at 3.3 N", "not clipped".
 std::string clipping_words(const simulation::DeviceModel& device);
 

@@ -176,6 +176,8 @@ std::vector<TouchOutcome> run_touch(const TouchSetup& setup, std::span<const Tou
     }
     outcomes[n] = touch;
     judges[n].finish(*outcomes[n]);
+    // Of a wall that nobody got to nothing is known.
+    if (outcomes[n]->verdict == simulation::ContactVerdict::no_contact) outcomes[n]->rendered = true;
   };
   double end = std::numeric_limits<double>::infinity();
   for (;; ++touch.samples) {
@@ -245,7 +247,7 @@ TouchOutcome simulate_touch(const TouchSetup& setup, std::vector<TouchSample>* r
   if (by_force) judgements.push_back(swings);
   const std::vector<TouchOutcome> outcomes = run_touch(
       setup, judgements, recording != nullptr ? Until::end_of_hold : Until::all_are_certain, recording);
-  return outcomes.front().held() ? outcomes.back() : outcomes.front();
+  return outcomes.front().unstable() ? outcomes.front() : outcomes.back();
 }
 
 std::vector<TouchOutcome> judge_touch(const TouchSetup& setup, std::span<const TouchJudgement> judgements) {

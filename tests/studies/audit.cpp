@@ -134,7 +134,6 @@ WallChange growth_read(const GrowthReading& reading) {
     setup.wall.wall.damping = static_cast<float>(reading.damping);
     setup.wall.damping_window = 1;
     setup.wall.velocity = {.kind = reading.calm_by};
-    setup.least_rendered_share = 0.0;
     setup.added_force = made_of<ReadGrowth>(reading);
   };
 }
@@ -270,13 +269,13 @@ std::vector<LawReading> law_readings() {
     readings.push_back({"grows from 3 N/mm in 0.2 s, damping 6 N s/m", what, growth_read(reading)});
   };
   const auto difference = control::VelocityEstimatorKind::difference;
-  growth("may stay softer than it is set", {});
-  growth("the same, keeps what has grown while not calm", {.falls = 0.0});
-  growth("the same, keeps it, grows by a share of itself", {.falls = 0.0, .by_itself = true});
-  growth("the same, calm by the difference of one sample", {.calm_by = difference});
-  growth("the same, calm by the difference, up to 0.05 m/s", {.calm = 0.05, .calm_by = difference});
-  growth("the same, calm by the difference, keeps it", {.falls = 0.0, .calm_by = difference});
-  growth("the same, calm by the difference, keeps it, grows by a share of itself",
+  growth("softer allowed", {});
+  growth("softer allowed, keeps what has grown while not calm", {.falls = 0.0});
+  growth("softer allowed, keeps it, grows by a share of itself", {.falls = 0.0, .by_itself = true});
+  growth("softer allowed, calm by the difference of one sample", {.calm_by = difference});
+  growth("softer allowed, calm by the difference, up to 0.05 m/s", {.calm = 0.05, .calm_by = difference});
+  growth("softer allowed, calm by the difference, keeps it", {.falls = 0.0, .calm_by = difference});
+  growth("softer allowed, calm by the difference, keeps it, grows by a share of itself",
          {.falls = 0.0, .by_itself = true, .calm_by = difference});
   return readings;
 }

@@ -61,7 +61,7 @@ struct GrowthReading {
   bool by_itself = false;  ///< by a share of what it is, e-fold in growth_time, else of what is missing
   control::VelocityEstimatorKind calm_by = control::VelocityEstimatorKind::foaw;
 };
-/// It counts as held wherever it is stable, also where it stays softer than it was set.
+/// Nobody asks what it comes to: it counts as held wherever it is stable.
 WallChange growth_read(const GrowthReading& reading);
 
 /// A damper over one sample which the wall may pull the handle in with: the firmware's does not.

@@ -69,13 +69,14 @@ WallChange at_any_stiffness(const WallChange& wall) {
   };
 }
 
-double rendered_share(const SubjectSet& set, const WallChange& wall, double stiffness,
+/// Of one's own stiffness each, mean of all touches.
+double rendered_share(const SubjectSet& set, const WallChange& wall, const PeopleMean& found,
                       const StiffnessRun& run) {
   double sum = 0.0;
-  for (const experiment::Subject& subject : set.subjects) {
-    TouchSetup setup = experiment::touch_setup(set.device, subject.person, {});
+  for (std::size_t n = 0; n < set.subjects.size(); ++n) {
+    TouchSetup setup = experiment::touch_setup(set.device, set.subjects[n].person, {});
     wall(setup);
-    setup.wall.wall.stiffness = static_cast<float>(stiffness);
+    setup.wall.wall.stiffness = static_cast<float>(found.people[n].stiffness);
     for (const double speed : run.protocol.approach_speeds)
       for (const double push : run.protocol.pushes) {
         setup.motion.approach_speed = speed;
@@ -99,7 +100,7 @@ std::vector<SeemingResult> run_seeming_walls(const SubjectSet& set, const Stiffn
   const std::vector<TwoMeans> found = sweep_by_both(set, walls, run);
   for (std::size_t n = 0; n < results.size(); ++n) {
     results[n].stable = found[n].both;
-    results[n].rendered = rendered_share(set, walls[n], found[n].both.mean, run);
+    results[n].rendered = rendered_share(set, walls[n], found[n].both, run);
   }
   return results;
 }
@@ -130,20 +131,27 @@ std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const Stiffn
 }
 
 namespace {
-/// What the count takes from the walls that grow.
+/// What a finer encoder gives the walls that grow.
 std::string finer_encoder_words(const std::vector<GrowingResult>& walls) {
   const std::vector<LoopSetting> situations = growing_situations();
   const auto at = static_cast<std::size_t>(std::ranges::find(situations, finer_encoder, &LoopSetting::name) -
                                            situations.begin());
-  const auto best = std::ranges::max_element(
-      walls, {}, [at](const GrowingResult& wall) { return wall.situations[at].both.mean; });
+  const GrowingResult* best = nullptr;
+  for (const GrowingResult& wall : walls)
+    if (wall.wall.starts_with("grows") &&
+        (best == nullptr || wall.situations[at].both.mean > best->situations[at].both.mean))
+      best = &wall;
   const PeopleMean& most = best->situations[at].both;
-  const double plain = walls.front().situations[at].both.mean;
+  const double usual = best->situations.front().both.mean, plain = walls.front().situations[at].both.mean;
+  const std::string_view more = most.ends.beyond_last > 0 ? "more than " : "";
   return fmt::format(
-      "What bounds them is the count: a handle that rests at the edge of one shakes the wall out of its "
-      "calm. With {} the wall that {} holds {}{} N/mm, {}{:.1f} times the plain wall with that encoder.",
-      finer_encoder, best->wall, most.ends.beyond_last > 0 ? "more than " : "", n_per_mm(most.mean),
-      most.ends.beyond_last > 0 ? "more than " : "", plain > 0.0 ? most.mean / plain : 0.0);
+      "With an encoder of {} the wall that {} holds {}{} N/mm, {}{:.1f} times the plain wall with that "
+      "encoder.{}",
+      finer_encoder, best->wall, more, n_per_mm(most.mean), more, plain > 0.0 ? most.mean / plain : 0.0,
+      most.mean > 2.0 * usual
+          ? " So it is the count that bounds it: a handle that rests at the edge of one shakes "
+            "the wall out of its calm."
+          : "");
 }
 }  // namespace
 
@@ -160,8 +168,8 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       {"wall"},
       {}};
   for (const LoopSetting& situation : growing_situations()) table.columns.push_back(situation.name);
-  const auto best = std::max_element(walls.begin(), walls.end(), [](const auto& one, const auto& other) {
-    return one.situations.front().both.mean < other.situations.front().both.mean;
+  const auto best = std::ranges::max_element(walls, {}, [](const GrowingResult& wall) {
+    return wall.wall.starts_with("grows") ? wall.situations.front().both.mean : -1.0;
   });
   experiment::MarkedMeans marks;
   for (const GrowingResult& wall : walls) {
@@ -183,7 +191,9 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
       {"wall", "calm by", "set to", "rendered, %", "rendered, N/mm"},
       {}};
   for (const SeemingResult& one : seeming)
-    seems.rows.push_back({one.wall, one.calm_by, n_per_mm(one.stable.mean),
+    seems.rows.push_back({one.wall, one.calm_by,
+                          marks.cell(one.stable.mean, one.stable.ends, set.subjects.size(),
+                                     fmt::format("{}, calm by {}", one.wall, one.calm_by)),
                           fmt::format("{:.0f}", 100.0 * one.rendered),
                           n_per_mm(one.rendered * one.stable.mean)});
   section.tables = {std::move(table), std::move(seems)};
@@ -194,11 +204,13 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
           "damper takes the difference over one sample (wall.damping_window = 1). No field, so nothing is "
           "felt at rest in front of it. It counts as held only if it is stable and comes to {:g} % of its "
           "stiffness in the hold's last quarter of a second. Pulses push the hand with 1.5 N into the wall "
-          "and then out of it, for 20 ms each, 1.9 and 2.05 s after the contact. In steps of 3 %.",
+          "and then out of it, for 20 ms each, 1.9 and 2.05 s after the contact. After them it has 0.8 s to "
+          "grow again, too short for 0.4 s. In steps of 3 %.",
           100.0 * TouchSetup().least_rendered_share),
-      fmt::format("Best where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
-                  best->wall, n_per_mm(best->situations.front().both.mean),
-                  best->situations.front().both.mean / walls.front().situations.front().both.mean),
+      fmt::format(
+          "Best of them where nothing disturbs: {}, {} N/mm by both criteria, {:.1f} times the plain wall.",
+          best->wall, n_per_mm(best->situations.front().both.mean),
+          best->situations.front().both.mean / walls.front().situations.front().both.mean),
       "Why it is asked: near its limit such a wall takes back what it has grown at each count that the "
       "handle goes on, and can be set far higher without ever oscillating or getting there, the more so the "
       "sooner a motion is noticed. The second table says what such a wall really is.",

@@ -115,6 +115,7 @@ std::vector<std::string> contact_words(const ContactSettings& settings, std::siz
         "30 ms before, as the encoder shows it.",
         intended->approach_speed, std::abs(intended->start_position - intended->wall_position) * 1e3));
   if (!settings.changes.empty()) words.push_back(settings.changes.sentence());
+  if (settings.changes.changes("wall.touch_stiffness")) words.push_back(growing_wall_words());
   if (!settings.papers_wall())
     words.push_back(fmt::format(
         "The paper's verdicts are of {}. This wall is another, so none of its verdicts is compared.",

@@ -42,15 +42,19 @@ void validate(const DesignTask& task) {
           "nobody touches: name people and touches");
   require(task.rate >= 100.0 && task.rate <= 1e5,
           fmt::format("loop of {} Hz: allowed is 100 to 100000 Hz", task.rate));
-  require(task.growth_time >= 0.0 && task.growth_time <= 60.0,
-          fmt::format("growth time of {:g} s: allowed is 0 (walls do not grow) to 60 s", task.growth_time));
+  require(
+      task.growth_time >= 0.0 && task.growth_time <= 1.0,
+      fmt::format(
+          "growth time of {:g} s: allowed is 0 (walls do not grow) to 1 s; a touch is held for 3 s, by whose "
+          "end a wall must have come to its stiffness",
+          task.growth_time));
   require(task.margin >= 0.0 && task.margin < 1.0,
           fmt::format("margin of {:g} %: allowed is 0 to below 100 %", 100.0 * task.margin));
   const double limit = task.set.device.force_limit;
   require(task.field >= 0.0 && (limit == 0.0 || task.field < limit),
           fmt::format(
-              "field of {:g} N on a device that makes {:g} N: nothing would be left for the wall; allowed "
-              "is 0 to below the device's force limit",
+              "field of {:g} N on a device that makes {:g} N: nothing would be left for the wall; allowed is "
+              "0 to below the device's force limit",
               task.field, limit));
 }
 

@@ -223,6 +223,7 @@ RunJournal::Json design_settings(const DesignTask& task) {
           {"pushes_n", task.protocol.pushes},
           {"moves_m", task.protocol.threshold},
           {"feels_n", task.protocol.force_threshold},
+          {"least_rendered_share", TouchSetup().least_rendered_share},
           {"field_n", task.field},
           {"growth_time_s", task.growth_time},
           {"depth_m", task.depth ? RunJournal::Json(*task.depth) : RunJournal::Json(nullptr)},

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host_tools/experiment/contact/contact_experiment.hpp"
+#include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
 
@@ -104,6 +105,7 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
           "mm within 0.25 s, at which the host ended the touch. The force is limited to {:g} N or less.",
           touch.threshold * 1000, limits.abort_amplitude * 1000, limits.force_limit)};
   if (!touch.changes.empty()) words.push_back(touch.changes.sentence());
+  if (touch.changes.changes("wall.touch_stiffness")) words.push_back(growing_wall_words());
   return words;
 }
 

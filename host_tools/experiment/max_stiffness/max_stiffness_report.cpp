@@ -103,8 +103,8 @@ std::string speed_words(const MaxStiffnessStudy& study) {
     at_contact.push_back(fmt::format("{:.2g}", speed.at_contact));
   }
   return fmt::format(
-      "Approach speeds are those that the hand intends. After a run-up of {:g} mm the handle "
-      "meets the wall at {} m/s where {} m/s were intended (plain wall, mean of people and pushes).",
+      "Approach speeds are those that the hand intends. After a run-up of {:g} mm the handle meets the wall "
+      "at {} m/s where {} m/s were intended (plain wall, mean of people and pushes).",
       study.run_up * 1e3, fmt::join(at_contact, ", "), fmt::join(intended, ", "));
 }
 
@@ -196,6 +196,11 @@ report::Section max_stiffness_section(const std::vector<MaxStiffnessStudy>& stud
   if (!first.contact_speeds.empty()) section.paragraphs.push_back(speed_words(first));
   if (!first.changes.empty())
     section.paragraphs.push_back(first.changes.sentence() + " Nothing was fitted again.");
+  if (first.changes.changes("wall.touch_stiffness"))
+    section.paragraphs.push_back(
+        fmt::format("A wall that grows counts as unstable as well when it comes to less than {:g} % of its "
+                    "stiffness in the last quarter of that second.",
+                    100.0 * TouchSetup().least_rendered_share));
   for (const MaxStiffnessStudy& study : studies) {
     section.paragraphs.push_back(
         fmt::format("{}: gamma = {:.4g} /N, friction {:.4g} N; {} touches, {:.0f} s simulated.",

@@ -120,10 +120,7 @@ std::vector<std::string> wall_test_words(const WallTestResult& result) {
   words.emplace_back(
       "The trace has at most 500 records a second and whole counts of the encoder, and the force has its "
       "limit: rate-hardness is what these let pass of the stiffness.");
-  if (result.grows)
-    words.emplace_back(
-        "The wall grows from wall.touch_stiffness: stable means here that it does not oscillate, not that it "
-        "comes to its stiffness. Force over depth at the end of a touch's samples says what it has come to.");
+  if (result.grows) words.push_back(growing_wall_words());
   if (!settings.changes.empty()) words.push_back(settings.changes.sentence());
   return words;
 }

@@ -64,7 +64,7 @@ struct DesignWallOptions {
                  "Largest force of a field on a handle at rest, N; 0: no field", 0.0, 100.0);
     add_quantity(command, "--growth", growth, "s",
                  "Time constant with which a wall may grow to its stiffness, s; 0: all of it at once", 0.0,
-                 60.0);
+                 1.0);
     add_quantity(command, "--depth", depth, "m", "Deepest that the handle may get, m; else however deep",
                  1e-6, 1.0);
     command

@@ -125,6 +125,7 @@ Json document_of(const WallTestResult& result, const experiment::Provenance& pro
   const experiment::WallTestSettings& settings = result.settings;
   return {{"origin", std::string(report::to_string(result.origin))},
           {"law", result.law},
+          {"grows", result.grows},
           {"haptic_rate_hz", result.haptic_rate},
           {"hold_time_s", settings.hold_time},
           {"threshold_m", settings.threshold},
@@ -142,7 +143,8 @@ void describe_wall(device::Device& device, std::size_t axis, WallTestResult& res
   const device::Parameter law = device::resolve(name("wall.law"));
   result.law = device::value_text(law, device.read(law));
   result.haptic_rate = device.read_number(name("haptic.rate"));
-  result.grows = device.read_number(name("wall.touch_stiffness")) > 0.0;
+  const double touch = device.read_number(name("wall.touch_stiffness"));
+  result.grows = touch > 0.0 && touch < std::ranges::max(result.settings.stiffnesses);
   if (result.law == "none")
     throw UsageError(fmt::format(
         "wall.law of axis {} is none: there is no wall to test; set one, or give --set wall.law=plain",

@@ -9,6 +9,7 @@ using simulation::Defect;
 /// Where the handle really was while a defect came up, which a device with a dead encoder cannot know.
 struct Course {
   std::string cause;
+  bool planted = false;
   double farthest = 0.0;    // m from the beginning
   double afterwards = 0.0;  // m from where the defect came up
 };
@@ -22,14 +23,13 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
   const auto& handle = device.drives().drive(0).handle();
   const double start = handle.position();
   double planted = start;
-  bool dead = false;
   const auto look = [&] {
     course.farthest = std::max(course.farthest, std::abs(handle.position() - start));
     course.afterwards = std::max(course.afterwards, std::abs(handle.position() - planted));
   };
   const auto plant_in_time = [&] {
-    if (dead || !comes_up(device)) return;
-    dead = true;
+    if (course.planted || !comes_up(device)) return;
+    course.planted = true;
     device.plant(Defect::encoder_stuck);
     planted = handle.position();
     course.afterwards = 0.0;
@@ -130,6 +130,10 @@ TEST_P(DeadEncoder, BetweenARecordAndTheEndOfItsExcitationThrowsTheHandleNowhere
   ASSERT_GT(tails, 5);
   for (int tail = 1; tail <= tails; ++tail) {
     const Course course = course_of(GetParam(), settings, InTail(tail));
+    ASSERT_TRUE(course.planted) << tail << " of " << tails;
+    if (course.afterwards > 0.002) {
+      EXPECT_NE(course.cause, "") << "in tail " << tail << " of " << tails;
+    }
     EXPECT_LE(course.farthest, 4.0 * settings.travel)
         << course.cause << " in tail " << tail << " of " << tails;
   }

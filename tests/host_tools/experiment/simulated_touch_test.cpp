@@ -265,6 +265,29 @@ TEST(SimulatedTouch, AWallThatStaysFarSofterThanItWasSetIsNotHeldHoweverStill) {
   EXPECT_TRUE(simulate_touch(setup).held());
 }
 
+// Which is said to have ended it when it also stays softer.
+TEST(SimulatedTouch, WhatSwingsByForceIsUnstableHoweverSoftItStays) {
+  TouchSetup setup = growing(15000.0, control::VelocityEstimatorKind::difference);
+  setup.force_threshold = 1e-3;
+  setup.judges_both = true;
+  const TouchOutcome outcome = simulate_touch(setup);
+  EXPECT_TRUE(outcome.unstable());
+  EXPECT_TRUE(outcome.by_force);
+  EXPECT_FALSE(outcome.rendered);
+}
+
+TEST(SimulatedTouch, AWallThatGrowsAndThatNobodyGetsToIsNotCalledSoft) {
+  TouchSetup setup = growing(15000.0, control::VelocityEstimatorKind::foaw);
+  setup.wall.wall.kind = control::WallKind::magnetic;
+  setup.wall.wall.magnetic_coefficient = 3.0F;
+  setup.wall.wall.magnetic_length = 0.05F;
+  setup.motion.push_force = 0.01;
+  setup.person.activation_gain = 0.0;
+  const TouchOutcome outcome = simulate_touch(setup);
+  ASSERT_EQ(outcome.verdict, simulation::ContactVerdict::no_contact);
+  EXPECT_TRUE(outcome.held());
+}
+
 // One rule for what a person answers to, whatever the experiment.
 TEST(ResistedForce, IsAllThatIsCommandedButTheWall) {
   using Loop = control::HapticLoop<float>;

@@ -178,6 +178,8 @@ TEST(WallDesign, ItsFileIsTheWallAndSaysWhereItComesFrom) {
   EXPECT_CONTAINS(text, "# A wall by 'kmax design wall'");
   EXPECT_CONTAINS(text, "drawn 2 at 0.5 m/s with a push of 0.6 N");
   EXPECT_CONTAINS(text, "the force swings by 1.5 N");
+  design.bound->ending = {.rendered_share = 0.6, .softer = true};
+  EXPECT_CONTAINS(wall_design_file(task, design), "the wall comes to 60 % of that and no more");
   EXPECT_CONTAINS(text, "stiffness = 5500");
   EXPECT_CONTAINS(text, "estimator = \"low_pass\"");
   EXPECT_CONTAINS(text, "magnetic_length = 0.003");
