@@ -10,6 +10,8 @@
 #include <limits>
 #include <vector>
 
+#include "tests/in_a_soak.hpp"
+
 namespace kmax::control::edge_period_velocity_test {
 
 using Estimator = EdgePeriodVelocity<double>;
@@ -278,6 +280,25 @@ TEST(EdgePeriodVelocity, AJumpIsNotSpreadOverTheRestBeforeIt) {
         for (int k = 0; k < 40; ++k) estimator.update(steps > 0 ? 3 : -3);
         EXPECT_EQ(std::abs(estimator.update(steps > 0 ? 3 : -3)), 3.0);
       }
+    }
+  }
+}
+
+// A motion that never turns leaves its origin behind, until the origin looks like a time to come.
+TEST(EdgePeriodVelocity, GoesOnWhenTheTimeOfItsOriginComesRound) {
+  if (!in_a_soak()) GTEST_SKIP() << "takes a minute: set KMAX_SOAK=1";
+  Estimator estimator, younger;
+  constexpr std::uint32_t round = 1U << 31;
+  std::uint32_t random = 1, until_edge = 0;
+  for (std::uint32_t n = 1; n < round + 10'000; ++n) {
+    const bool edge = until_edge == 0;
+    if (edge) random = random * 1'664'525U + 1'013'904'223U;
+    until_edge = edge ? 2 + (random >> 29) : until_edge - 1;
+    const double velocity = estimator.update(edge ? 1 : 0);
+    if (n < round - 10'000) continue;
+    const double same = younger.update(edge ? 1 : 0);
+    if (n > round - 9'000) {
+      ASSERT_EQ(velocity, same) << n;
     }
   }
 }
