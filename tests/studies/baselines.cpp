@@ -125,7 +125,7 @@ std::vector<Baseline> law_baselines() {
                           both(growing(3000.0, 0.2, 6.0), field(2.0))}});
   add("passivity",
       {{"passivity controller, alpha <= 15 N s/m", passivity_controlled(15.0, false)},
-       {"the same against the spring's energy", passivity_controlled(15.0, true)},
+       {"passivity controller against the spring's energy", passivity_controlled(15.0, true)},
        {"field of 2 N, against the spring's energy", both(field(2.0), passivity_controlled(15.0, true))}});
   return laws;
 }

@@ -335,9 +335,10 @@ void add_design_wall_command(CLI::App& design, Context& context) {
   kmax design wall --shard 1/4 --out shares              on four computers, 1/4 to 4/4; then
   kmax design wall --merge shares --save wall.toml
 
-Searched are wall.damping, velocity.estimator (all but edge_period) with its window or bandwidth, a field up to --field, with --growth
-the stiffness at the moment of contact, and the stiffness. Nobody's touch may be unstable, neither by the handle's motion nor by the force. Exit code 3: no
-wall holds. See docs/design_wall.md.)"},
+Searched are wall.damping, velocity.estimator (all but edge_period) with its window or bandwidth, a field up
+to --field, with --growth the stiffness at the moment of contact, and the stiffness. Nobody's touch may be
+unstable, neither by the handle's motion nor by the force; a wall that grows must come to 95 % of its
+stiffness. Exit code 3: no wall holds. See docs/design_wall.md.)"},
       Takes::nothing, run_design_wall);
 }
 
