@@ -97,7 +97,9 @@ class DeviceRig final : public Rig {
 };
 
 /// What a device is set to for a wall, NAME=VALUE, on the wall's axis unless it says otherwise: the same
-/// parameters whatever its law.
+/// parameters whatever its law. Every setting of wall and interference is among them, its default where
+/// nothing is said of it, so that no wall that somebody has saved shows through; but for the place of the
+/// surface and the ceilings, which stay the device's. Of a wall `as_set` only stiffness and forces.
 std::vector<std::string> wall_assignments(const RigWall& wall, std::size_t axis, RigAxes axes);
 
 /// Towards the wall, m/s, over the last 30 ms before time 0; 0 without samples there.

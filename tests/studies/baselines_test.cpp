@@ -231,8 +231,8 @@ TEST(GrowingWalls, HoldMoreThanThePlainWallAlsoWithDelay) {
   EXPECT_TRUE(section.tables[0].rows[0][1].ends_with(" (1.0)"));
   // What notices each count hardly oscillates, however high it is set, and is far from there.
   EXPECT_GT(seeming[1].stable.mean, 1.3 * seeming[0].stable.mean);
-  EXPECT_LT(seeming[1].rendered, 0.7);
-  EXPECT_LT(seeming[1].rendered * seeming[1].stable.mean, 1.1 * walls[3].situations[0].both.mean);
+  EXPECT_LT(seeming[1].rendered, 0.7 * seeming[1].stable.mean);
+  EXPECT_LT(seeming[1].rendered, 1.1 * walls[3].situations[0].both.mean);
 }
 
 TEST(GrowingWalls, APulsePushesIntoTheWallAndOut) {

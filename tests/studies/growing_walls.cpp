@@ -12,7 +12,7 @@ namespace {
 
 using Kind = control::VelocityEstimatorKind;
 constexpr auto difference = Kind::difference;
-constexpr std::string_view finer_encoder = "5.5 um";
+constexpr std::string_view finer_encoder = "5.5 um", damper_alone = "damping 8 N s/m";
 constexpr std::uint32_t drawn_seed = 5;
 constexpr std::size_t drawn_count = 200;
 
@@ -69,9 +69,9 @@ WallChange at_any_stiffness(const WallChange& wall) {
   };
 }
 
-/// Of one's own stiffness each, mean of all touches.
-double rendered_share(const SubjectSet& set, const WallChange& wall, const PeopleMean& found,
-                      const StiffnessRun& run) {
+/// N/m, with each one's own largest stiffness, mean of all touches.
+double rendered_stiffness(const SubjectSet& set, const WallChange& wall, const PeopleMean& found,
+                          const StiffnessRun& run) {
   double sum = 0.0;
   for (std::size_t n = 0; n < set.subjects.size(); ++n) {
     TouchSetup setup = experiment::touch_setup(set.device, set.subjects[n].person, {});
@@ -82,7 +82,7 @@ double rendered_share(const SubjectSet& set, const WallChange& wall, const Peopl
         setup.motion.approach_speed = speed;
         setup.motion.push_force = push;
         std::vector<experiment::TouchSample> to_the_end;
-        sum += simulate_touch(setup, &to_the_end).rendered_share;
+        sum += simulate_touch(setup, &to_the_end).rendered_share * found.people[n].stiffness;
       }
   }
   return sum / static_cast<double>(set.subjects.size() * run.protocol.approach_speeds.size() *
@@ -100,13 +100,14 @@ std::vector<SeemingResult> run_seeming_walls(const SubjectSet& set, const Stiffn
   const std::vector<TwoMeans> found = sweep_by_both(set, walls, run);
   for (std::size_t n = 0; n < results.size(); ++n) {
     results[n].stable = found[n].both;
-    results[n].rendered = rendered_share(set, walls[n], found[n].both, run);
+    results[n].rendered = rendered_stiffness(set, walls[n], found[n].both, run);
   }
   return results;
 }
 
 std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const StiffnessRun& run) {
-  std::vector<Baseline> laws{plain_wall(), field_of_two(), {"damping 8 N s/m", damped(8.0, difference)}};
+  std::vector<Baseline> laws{
+      plain_wall(), field_of_two(), {std::string(damper_alone), damped(8.0, difference)}};
   for (const double touch : {2000.0, 3000.0})
     for (const double time : {0.2, 0.4})
       for (const double damping : {0.0, 6.0})
@@ -171,7 +172,7 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
   const auto best = std::ranges::max_element(walls, {}, [](const GrowingResult& wall) {
     return wall.wall.starts_with("grows") ? wall.situations.front().both.mean : -1.0;
   });
-  const auto damped = std::ranges::find(walls, "damping 8 N s/m", &GrowingResult::wall);
+  const auto damped = std::ranges::find(walls, damper_alone, &GrowingResult::wall);
   experiment::MarkedMeans marks;
   for (const GrowingResult& wall : walls) {
     table.rows.push_back({wall.wall});
@@ -195,8 +196,8 @@ report::Section growing_section(const SubjectSet& set, const std::vector<Growing
     seems.rows.push_back({one.wall, one.calm_by,
                           marks.cell(one.stable.mean, one.stable.ends, set.subjects.size(),
                                      fmt::format("{}, calm by {}", one.wall, one.calm_by)),
-                          fmt::format("{:.0f}", 100.0 * one.rendered),
-                          n_per_mm(one.rendered * one.stable.mean)});
+                          fmt::format("{:.0f}", 100.0 * one.rendered / one.stable.mean),
+                          n_per_mm(one.rendered)});
   section.tables = {std::move(table), std::move(seems)};
   section.paragraphs = {
       fmt::format(

@@ -392,7 +392,7 @@ std::vector<GrowingResult> run_growing_walls(const SubjectSet& set, const Stiffn
 struct SeemingResult {
   std::string wall, calm_by;
   PeopleMean stable;      ///< by both criteria
-  double rendered = 0.0;  ///< share of each one's, mean of all touches
+  double rendered = 0.0;  ///< N/m, with each one's own, mean of all touches
 };
 std::vector<SeemingResult> run_seeming_walls(const SubjectSet& set, const StiffnessRun& run);
 report::Section growing_section(const SubjectSet& set, const std::vector<GrowingResult>& walls,
