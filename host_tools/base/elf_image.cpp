@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace kmax {
+namespace kmax::base {
 namespace {
 
 constexpr std::uint32_t without_thumb_bit(std::uint32_t address) {
@@ -142,4 +142,4 @@ std::string ElfImage::function_at(std::uint32_t address) const {
   return offset == 0 ? found->second : fmt::format("{}+0x{:x}", found->second, offset);
 }
 
-}  // namespace kmax
+}  // namespace kmax::base

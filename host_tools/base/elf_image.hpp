@@ -12,7 +12,7 @@
 // A firmware image as the linker left it: what has to be in memory, where it begins, and the names in it.
 // ELF32 for ARM, little-endian, linked (not relocatable). System V ABI, object files.
 
-namespace kmax {
+namespace kmax::base {
 
 /// The file cannot be used; the message names the file and says why.
 class ElfError : public std::runtime_error {
@@ -59,4 +59,4 @@ class ElfImage {
   std::map<std::uint32_t, std::string> functions_;
 };
 
-}  // namespace kmax
+}  // namespace kmax::base

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace kmax::device {
+namespace kmax::base {
 
 /// What the user asked for cannot be meant: an unknown name, a value that is not allowed. Nothing was sent.
 /// Also thrown when the device finds the same fault in values that only it can judge together.
@@ -24,4 +24,4 @@ class StoodStill : public DeviceError {
   using DeviceError::DeviceError;
 };
 
-}  // namespace kmax::device
+}  // namespace kmax::base

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace kmax::cli {
+namespace kmax::base {
 
 /// What the program returns; a contract with scripts.
 enum ExitCode : int {
@@ -14,4 +14,4 @@ inline constexpr const char* exit_code_text =
     "Exit codes: 0 done; 1 the device, link or run failed; 2 wrong usage or value;\n"
     "            3 a check or experiment ran and its verdict is \"no\".";
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

@@ -9,7 +9,7 @@
 #include <ctime>
 #include <utility>
 
-namespace kmax::link {
+namespace kmax::base {
 
 /// An open file of the operating system, closed with its owner; -1: none.
 class FileDescriptor {
@@ -44,4 +44,4 @@ inline bool wait_for(int descriptor, short events, std::chrono::microseconds wai
   return ppoll(&one, 1, &time, nullptr) > 0;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::base

@@ -3,7 +3,7 @@
 #include <array>
 #include <csignal>
 
-namespace kmax::cli {
+namespace kmax::base {
 
 namespace {
 constexpr std::array signals = {SIGINT, SIGTERM, SIGHUP};
@@ -37,4 +37,4 @@ bool Interruption::last_was_requested() {
   return seen != 0;
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

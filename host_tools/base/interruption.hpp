@@ -1,6 +1,6 @@
 #pragma once
 
-namespace kmax::cli {
+namespace kmax::base {
 
 /// While one exists, Ctrl-C (SIGINT), SIGTERM and SIGHUP do not end the program: they are remembered, so
 /// that a command can leave the device in order. One at a time.
@@ -17,4 +17,4 @@ class Interruption {
   static bool last_was_requested();
 };
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

@@ -9,7 +9,7 @@
 
 #include "host_tools/base/errors.hpp"
 
-namespace kmax::device {
+namespace kmax::base {
 
 namespace {
 using Buffer = std::array<char, 400>;  // the longest plain double has 309 digits before the point
@@ -155,4 +155,4 @@ WrittenNumber written_number(std::string_view given, std::string_view unit, std:
   return {scale->to_si(number), in_unit(std::string(bare), suffix.empty() ? unit : suffix)};
 }
 
-}  // namespace kmax::device
+}  // namespace kmax::base

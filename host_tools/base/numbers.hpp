@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kmax::device {
+namespace kmax::base {
 
 /// The double whose shortest text is also the shortest text that reads back as this float32: 2.4f gives
 /// 2.4, not 2.4000000953674316. For JSON, whose numbers are doubles.
@@ -51,4 +51,4 @@ struct WrittenNumber {
 WrittenNumber written_number(std::string_view text, std::string_view unit, std::string_view kind,
                              std::string_view allowed);
 
-}  // namespace kmax::device
+}  // namespace kmax::base

@@ -4,7 +4,7 @@
 
 #include <ostream>
 
-namespace kmax::cli {
+namespace kmax::base {
 
 /// Formats `values` into `text` and writes it to `out`. fmt::print() of <fmt/ostream.h> does the same, but
 /// every file that uses it compiles the formatting of every type again: 2.5 of 10.5 s.
@@ -13,4 +13,4 @@ void print(std::ostream& out, fmt::format_string<Values...> text, Values&&... va
   out << fmt::vformat(text, fmt::make_format_args(values...));
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

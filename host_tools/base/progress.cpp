@@ -4,7 +4,7 @@
 
 #include "host_tools/base/terminal_text.hpp"
 
-namespace kmax::cli {
+namespace kmax::base {
 
 Progress::Progress(std::ostream& messages)
     : messages_(messages), terminal_(terminal_behind(messages).has_value()) {}
@@ -34,4 +34,4 @@ void Progress::show(const std::string& text) {
   on_terminal_ = this;
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

@@ -4,7 +4,7 @@
 #include <ostream>
 #include <string>
 
-namespace kmax::cli {
+namespace kmax::base {
 
 /// One line that says how far something is, on the messages' stream: rewritten in place on a terminal, cut to
 /// its width, at most five times a second; elsewhere a line every two seconds.
@@ -32,4 +32,4 @@ class Progress {
   inline static Progress* on_terminal_ = nullptr;  ///< a process has one terminal
 };
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace kmax::device {
+namespace kmax::base {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before_last(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
@@ -59,4 +59,4 @@ std::string did_you_mean(std::string_view name, std::span<const std::string> can
   return names.empty() ? "" : fmt::format("; did you mean {}?", fmt::join(names, " or "));
 }
 
-}  // namespace kmax::device
+}  // namespace kmax::base

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kmax::device {
+namespace kmax::base {
 
 /// Insertions, deletions, replacements and swaps of neighbours that turn one text into the other (optimal
 /// string alignment). Cost: length x length.
@@ -19,4 +19,4 @@ std::vector<std::string> closest(std::string_view name, std::span<const std::str
 /// "; did you mean wall.stiffness or guard.stiffness?", or empty if nothing is close.
 std::string did_you_mean(std::string_view name, std::span<const std::string> candidates);
 
-}  // namespace kmax::device
+}  // namespace kmax::base

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <iostream>
 
-namespace kmax::cli {
+namespace kmax::base {
 
 std::optional<TerminalSize> terminal_size(int descriptor) {
   if (isatty(descriptor) != 1) return std::nullopt;
@@ -130,4 +130,4 @@ std::string wrapped(std::string_view text, std::size_t width, std::size_t indent
   return fmt::format("{}", fmt::join(lines_of(text, width), "\n" + std::string(indent, ' ')));
 }
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kmax::cli {
+namespace kmax::base {
 
 struct TerminalSize {
   std::size_t columns = 80, rows = 24;
@@ -38,4 +38,4 @@ std::vector<std::string> lines_of(std::string_view text, std::size_t width);
 /// without them; 0: as it is.
 std::string wrapped(std::string_view text, std::size_t width, std::size_t indent = 0);
 
-}  // namespace kmax::cli
+}  // namespace kmax::base

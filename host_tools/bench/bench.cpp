@@ -45,7 +45,7 @@ microseconds of_seconds(double seconds) {
 void require_disarmed(device::Device& device) {
   for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
     if (device::Drive(device, axis).status().armed())
-      throw device::DeviceError(fmt::format("axis {} is armed; 'kmax disarm' first", axis));
+      throw base::DeviceError(fmt::format("axis {} is armed; 'kmax disarm' first", axis));
   }
 }
 
@@ -125,8 +125,8 @@ std::optional<Trip> Bench::trip() {
   if (status.armed()) return std::nullopt;
   armed_ = false;
   if (!status.faulty())
-    throw device::DeviceError(fmt::format("axis {}: somebody else has disarmed it: {}", drive_.axis(),
-                                          device::to_string(status.state())));
+    throw base::DeviceError(fmt::format("axis {}: somebody else has disarmed it: {}", drive_.axis(),
+                                        device::to_string(status.state())));
   return cleared(status);
 }
 
@@ -134,7 +134,7 @@ Trip Bench::cleared(const device::DriveStatus& status) {
   Trip found{device::fault_of(status), status.fault_words(), false, static_cast<double>(status.fault_value)};
   try {
     drive_.clear();
-  } catch (const device::DeviceError&) {
+  } catch (const base::DeviceError&) {
     found.remains = unusable_ = true;
   }
   return found;
@@ -151,7 +151,7 @@ void Bench::arm_when_ready() {
     try {
       drive_.arm();
       return;
-    } catch (const device::DeviceError&) {
+    } catch (const base::DeviceError&) {
       const device::DriveStatus status = drive_.status();
       if (status.armed() || status.faulty() || !starting(status.refusal) || device_.link().now() >= end)
         throw;
@@ -176,7 +176,7 @@ void Bench::arm(double reach) {
     // Even an attempt that ends in an exception may have armed it.
     armed_ = true;
     arm_when_ready();
-  } catch (const device::DeviceError& error) {
+  } catch (const base::DeviceError& error) {
     const device::DriveStatus status = drive_.status();
     armed_ = status.armed();
     if (armed_) throw;
@@ -245,7 +245,7 @@ void Bench::finish_and_brake(Waveforms& seen) {
     seen.stood_afterwards = stands();
     if (seen.stood_afterwards) break;
     if (device_.link().now() >= end)
-      throw device::DeviceError(
+      throw base::DeviceError(
           fmt::format("axis {}: the excitation does not end; look at excitation.duration", drive_.axis()));
     device_.link().wait(next_look());
   }
@@ -257,7 +257,7 @@ void Bench::require_heard(const Trip& trip) const {
 }
 
 // What could not be done for `error`: was it because the host was held up?
-void Bench::require_heard_after(const device::DeviceError& error) {
+void Bench::require_heard_after(const base::DeviceError& error) {
   const device::DriveStatus status = drive_.status();
   const bool silent = heard_nothing(status);
   if (!silent && !(stood_still(error) && !status.faulty())) return;
@@ -281,7 +281,7 @@ Waveforms Bench::record_heard(const ExcitationPlan& excitation, const CapturePla
     Waveforms seen = record_once(excitation, plan, reach, afterwards);
     if (seen.trip) require_heard(*seen.trip);
     return seen;
-  } catch (const device::DeviceError& error) {
+  } catch (const base::DeviceError& error) {
     // It could not be armed, or the excitation never came.
     require_heard_after(error);
     throw;
@@ -351,7 +351,7 @@ Waveforms Bench::finish_capture(device::CaptureReader& reader, Afterwards afterw
     seen.interval = captured.interval / captured.tick_rate;
     seen.before = captured.trigger_sample;
     for (const device::CaptureColumn& column : captured.columns) seen.channels[column.name] = column.values;
-  } catch (const device::DeviceError&) {
+  } catch (const base::DeviceError&) {
     // Stopped before it began.
     if (!seen.trip && !seen.stood) throw;
   }

@@ -60,7 +60,7 @@ void require_disarmed(device::Device& device);
 /// link.timeout of a second before the axis is armed: a broken link or a killed program ends the force.
 ///
 /// Errors: HeldUp from record(); ArmingRefused; AxisTripped if it trips while nothing is captured;
-/// device::DeviceError, link::LinkError. An axis that trips during a capture is no error: Waveforms::trip.
+/// base::DeviceError, device::LinkError. An axis that trips during a capture is no error: Waveforms::trip.
 class Bench {
  public:
   using Progress = std::function<void(const std::string&)>;
@@ -134,7 +134,7 @@ class Bench {
   Waveforms record_once(const ExcitationPlan& excitation, const CapturePlan& plan, double reach,
                         Afterwards afterwards);
   void require_heard(const Trip& trip) const;
-  void require_heard_after(const device::DeviceError& error);
+  void require_heard_after(const base::DeviceError& error);
   void arm_when_ready();
   Trip cleared(const device::DriveStatus& status);
   void begin_capture(device::CaptureReader& reader, const CapturePlan& plan,

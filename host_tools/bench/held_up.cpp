@@ -22,15 +22,15 @@ bool heard_nothing(const device::DriveStatus& status) {
 }
 
 bool stood_still(const std::exception& error) {
-  return dynamic_cast<const device::StoodStill*>(&error) != nullptr;
+  return dynamic_cast<const base::StoodStill*>(&error) != nullptr;
 }
 
 void require_another_try(int silences, const HeldUp& held_up) {
   if (silences < most_silences) return;
-  throw device::DeviceError(
+  throw base::DeviceError(
       fmt::format("{} times in a row the device heard nothing for {} s and removed the force: this program "
                   "or the link was held up for so long; try again when this computer has less to do",
-                  silences, device::number_text(held_up.silence)));
+                  silences, base::number_text(held_up.silence)));
 }
 
 void Standstill::begin() {
@@ -38,7 +38,8 @@ void Standstill::begin() {
 }
 
 bool Standstill::make_ready(const std::exception& error, std::string& why) const {
-  const bool without_a_fault = dynamic_cast<const link::LinkError*>(&error) != nullptr || stood_still(error);
+  const bool without_a_fault =
+      dynamic_cast<const device::LinkError*>(&error) != nullptr || stood_still(error);
   why = error.what();
   bool silent = false;
   for (const std::size_t axis : axes_) {
@@ -47,7 +48,7 @@ bool Standstill::make_ready(const std::exception& error, std::string& why) const
     if (!heard_nothing(status)) continue;
     silent = true;
     why = fmt::format("the device heard nothing for {} s and removed the force",
-                      device::number_text(status.fault_value));
+                      base::number_text(status.fault_value));
   }
   if (!silent && !without_a_fault) return false;
   if (device_.read(uptime) < uptime_) return false;

@@ -29,7 +29,7 @@ inline constexpr int most_silences = 3;
 
 /// Whether the axis has lost its force to a silent host.
 bool heard_nothing(const device::DriveStatus& status);
-/// Whether this program has given up what it was doing since it had not been run (device::StoodStill).
+/// Whether this program has given up what it was doing since it had not been run (base::StoodStill).
 bool stood_still(const std::exception& error);
 
 /// Throws DeviceError if this is `most_silences` in a row.
@@ -44,7 +44,7 @@ auto repeat_if_held_up(Measure measure, Again again) -> decltype(measure()) {
       return measure();
     } catch (const HeldUp& held_up) {
       require_another_try(++silences, held_up);
-      again("measuring again: the device heard nothing for " + device::number_text(held_up.silence) + " s");
+      again("measuring again: the device heard nothing for " + base::number_text(held_up.silence) + " s");
     }
   }
 }
@@ -63,9 +63,10 @@ class Standstill {
   void begin();
 
   /// After the work has ended with `error`. A standstill was the cause if an axis has the fault link_silent;
-  /// and also if the device did not answer (link::LinkError) or this program had to give up what it was doing
-  /// (device::StoodStill), and the device is in order. Then the axes are disarmed, link_silent is cleared,
-  /// and `notice` gets a line that begins with `name`. Parameters are left alone: lowered limits stay.
+  /// and also if the device did not answer (device::LinkError) or this program had to give up what it was
+  /// doing (base::StoodStill), and the device is in order. Then the axes are disarmed, link_silent is
+  /// cleared, and `notice` gets a line that begins with `name`. Parameters are left alone: lowered limits
+  /// stay.
   ///
   /// Never if one of the axes has another fault or was stopped, if the device cannot be reached now, or if it
   /// has been restarted, which lost the limits. Then no fault is cleared. Throws only what `notice` does.

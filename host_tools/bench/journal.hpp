@@ -15,7 +15,7 @@ namespace kmax::bench {
 /// been put back or kept when the journal ends is put back then. A text is "NAME=VALUE"; a name without
 /// prefix is on the axis. The axis must be disarmed whenever something is put back.
 ///
-/// Errors: device::ValueError, device::DeviceError, link::LinkError. The destructor throws nothing: if it
+/// Errors: base::ValueError, base::DeviceError, device::LinkError. The destructor throws nothing: if it
 /// fails, `notice` gets the reason and the former values as NAME=VALUE, to be set by hand.
 class Journal {
  public:

@@ -28,8 +28,8 @@ class Interrupted : public std::runtime_error {
 /// Until a hand has done what it was asked for: calls `progress` with `text`, and `seen`, every 20 ms of the
 /// link's time, until that is true. False: `patience` (s) is over.
 template <typename Seen>
-bool wait_for_hand(link::Link& link, double patience, const std::function<void(const std::string&)>& progress,
-                   const char* text, Seen seen) {
+bool wait_for_hand(device::Link& link, double patience,
+                   const std::function<void(const std::string&)>& progress, const char* text, Seen seen) {
   const auto start = link.now();
   while (std::chrono::duration<double>(link.now() - start).count() < patience) {
     progress(text);

@@ -35,7 +35,7 @@ bool wait_for(device::Device& device, const Settings& settings, const Party& par
 /// What the probe has changed, as it was.
 void put_back(Probe& probe) {
   const selftest::Restored restored = probe.restore();
-  if (!restored.in_order) throw device::DeviceError(restored.words);
+  if (!restored.in_order) throw base::DeviceError(restored.words);
 }
 
 /// The handle counts nothing for 0.3 s.

@@ -40,7 +40,7 @@ class OutOfTurn : public std::runtime_error {
 /// A stage ends with the axis disarmed and every parameter as it was; what the calibration found is saved,
 /// and the walls' stages leave the wall's place and stiffness that they ended with, unsaved.
 ///
-/// True: all passed. Errors: OutOfTurn; device::DeviceError, link::LinkError, and what progress or the person
+/// True: all passed. Errors: OutOfTurn; base::DeviceError, device::LinkError, and what progress or the person
 /// throw: the stage under way then has no result.
 bool bring_up(device::Device& device, Report& report, const Settings& settings, const Party& party,
               const std::function<void(const Report&)>& keep);

@@ -114,7 +114,7 @@ void require_ready(device::Device& device, std::size_t axis) {
   bench::require_disarmed(device);
   const device::DriveStatus status = device::Drive(device, axis).status();
   if (status.faulty())
-    throw device::DeviceError(
+    throw base::DeviceError(
         fmt::format("axis {} has a fault: {}; then 'kmax clear'", axis, status.fault_words()));
 }
 
@@ -247,7 +247,7 @@ void run_step(const Step& step, Calibration& run) {
   } catch (const bench::ArmingRefused& refused) {
     failure = diagnosis_of(refused.refusal(), bench.number("supply.voltage"),
                            bench.number("supply.voltage_min"), bench.number("supply.voltage_max"));
-  } catch (const device::ValueError& beyond) {
+  } catch (const base::ValueError& beyond) {
     // A result that no such device can have, or not a number.
     failure = {run.report.name + "_not_resolved", beyond.what(),
                "raise --current or --travel; nobody may hold the handle"};
@@ -354,7 +354,7 @@ CalibrationReport calibrate(device::Device& device, const CalibrationSettings& s
   } catch (const std::exception& error) {
     const std::string left = restore(bench);
     if (left.empty()) throw;
-    throw device::DeviceError(fmt::format("{}; {}", error.what(), left));
+    throw base::DeviceError(fmt::format("{}; {}", error.what(), left));
   }
 }
 

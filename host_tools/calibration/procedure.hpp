@@ -92,7 +92,7 @@ struct CalibrationReport {
 // it to end the calibration. `started` (may be empty): a step begins. `prompter` may be null.
 //
 // Errors: NothingToCalibrate; whatever `progress` throws (a bench::Interrupted with what has become of the
-// axis and its parameters added); device::DeviceError, link::LinkError. If the axis could not be disarmed or
+// axis and its parameters added); base::DeviceError, device::LinkError. If the axis could not be disarmed or
 // a parameter not put back: DeviceError or bench::Interrupted, saying so. A step's verdict is none.
 CalibrationReport calibrate(device::Device& device, const CalibrationSettings& settings,
                             bench::Prompter* prompter,

@@ -92,7 +92,7 @@ struct Calibration {
   std::vector<std::string> results_at_end{};  // NAME=VALUE
 
   // Results that would disturb the steps to come: set when all have passed. A value that the device could not
-  // hold is this step's failure (device::ValueError), not that of the end.
+  // hold is this step's failure (base::ValueError), not that of the end.
   void set_at_end(const std::vector<std::string>& texts);
 };
 

@@ -50,8 +50,8 @@ std::string case_text(const control::StabilityCase<double>& c, const std::string
 /// Lines of at most `width` columns, each line of `text` going on with `indent`.
 std::string fitted(const std::string& text, std::size_t width, std::size_t indent) {
   std::string fitting;
-  for (const std::string& line : cli::lines_of(text, std::string::npos))
-    fitting += (line.size() <= width ? line : cli::wrapped(line, width - indent, indent)) + '\n';
+  for (const std::string& line : base::lines_of(text, std::string::npos))
+    fitting += (line.size() <= width ? line : base::wrapped(line, width - indent, indent)) + '\n';
   return fitting;
 }
 

@@ -92,7 +92,7 @@ static_assert(in_order());
 
 std::string wrapped(std::string_view text, std::string_view indent, std::size_t width) {
   std::string out;
-  for (const std::string& line : cli::lines_of(text, width - indent.size()))
+  for (const std::string& line : base::lines_of(text, width - indent.size()))
     out += fmt::format("{}{}\n", indent, line);
   return out;
 }

@@ -19,7 +19,7 @@ control::Hand<double> hand_of(const simulation::OperatorModel& person) {
 }
 
 simulation::OperatorModel read_person(const std::string& path) {
-  const std::string text = base::text_of<device::ValueError>(
+  const std::string text = base::text_of<base::ValueError>(
       path, "--hand takes none, subject_1, or the path of a TOML file with [operator]");
   const simulation::SceneTables tables(path);
   const toml::table root = base::parsed_toml<simulation::SceneError>(text, path);

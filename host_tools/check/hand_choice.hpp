@@ -15,7 +15,7 @@ struct HandChoice {
 /// simulation/operator_model.hpp), or a TOML file with an [operator] table as scenes have it; numbers it does
 /// not give are subject_1's, other tables are passed over, so that a scene will do. The impedance is that of
 /// the relaxed hand: activation is not applied. Throws simulation::SceneError with the place in the file, and
-/// device::ValueError for a file that cannot be read.
+/// base::ValueError for a file that cannot be read.
 HandChoice choose_hand(const std::string& text);
 
 }  // namespace kmax::check

@@ -116,7 +116,7 @@ Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
 
 control::StabilityCase<double> parameter_case(const firmware::ParameterValues& values, std::size_t axis,
                                               const control::Hand<double>& hand) {
-  auto judged = firmware::stability_case<double>(values, axis, device::shortest_double);
+  auto judged = firmware::stability_case<double>(values, axis, base::shortest_double);
   judged.hand = hand;
   return judged;
 }

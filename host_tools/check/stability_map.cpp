@@ -16,8 +16,8 @@
 
 namespace kmax::check {
 
+using base::ValueError;
 using device::Parameter;
-using device::ValueError;
 
 namespace {
 constexpr std::size_t points_max = 1000;
@@ -39,7 +39,7 @@ std::size_t parse_points(std::string_view text, std::string_view whole) {
 
 double parse_end(const Parameter& parameter, std::string_view text) {
   const std::uint32_t raw = device::parse_value(parameter, text);
-  return device::shortest_double(std::bit_cast<float>(raw));
+  return base::shortest_double(std::bit_cast<float>(raw));
 }
 }  // namespace
 
@@ -78,10 +78,10 @@ MapAxis parse_map_axis(std::string_view text, std::size_t default_axis) {
   axis.to = parse_end(parameter, range.substr(dots + 2));
   if (!(axis.from < axis.to))
     throw ValueError(fmt::format("--map {}: from {} to {} is no range; FROM must be below TO", text,
-                                 device::number_text(axis.from), device::number_text(axis.to)));
+                                 base::number_text(axis.from), base::number_text(axis.to)));
   if (axis.logarithmic && !(axis.from > 0))
     throw ValueError(fmt::format("--map {}: a logarithmic side cannot begin at {}; FROM must be above 0",
-                                 text, device::number_text(axis.from)));
+                                 text, base::number_text(axis.from)));
   return axis;
 }
 

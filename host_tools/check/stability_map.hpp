@@ -26,7 +26,7 @@ struct MapAxis {
 
 /// "wall.stiffness=0.1N/mm..10N/mm:log,80": NAME=FROM..TO, then :log for equal ratios, then ,POINTS
 /// (2 .. 1000, 60 without). FROM and TO with units as `kmax set` takes them, within the parameter's range,
-/// FROM below TO, above 0 for log. Errors: device::ValueError that says what is allowed; also for parameters
+/// FROM below TO, above 0 for log. Errors: base::ValueError that says what is allowed; also for parameters
 /// that are no real numbers, or only read.
 MapAxis parse_map_axis(std::string_view text, std::size_t default_axis);
 
@@ -41,7 +41,7 @@ struct StabilityMap {
 };
 
 /// Rules between parameters (haptic.rate divides 20000 Hz) are not asked for: the map is of the criteria.
-/// Throws device::ValueError if both sides are the same parameter.
+/// Throws base::ValueError if both sides are the same parameter.
 StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t axis,
                            const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y);
 

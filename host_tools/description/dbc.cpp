@@ -188,7 +188,7 @@ void write_message(std::ostream& out, const Message& message) {
              message.from_device ? "Kmax" : "Host");
   for (const Signal& signal : message.signals) {
     fmt::print(out, " SG_ {} : {}|{}@1{} (1,0) [{}|{}] {} {}\n", signal.name, signal.start, signal.bits,
-               signal.has_sign ? '-' : '+', device::number_text(signal.low), device::number_text(signal.high),
+               signal.has_sign ? '-' : '+', base::number_text(signal.low), base::number_text(signal.high),
                quoted(signal.unit), message.from_device ? "Host" : "Kmax");
   }
   fmt::print(out, "\n");

@@ -32,8 +32,8 @@ CaptureChannel channel_of(std::string_view name) {
     if (text.name == name && text.channel != CaptureChannel::none) return text.channel;
   }
   const auto names = capture_channel_names();
-  const std::string meant = did_you_mean(name, names);
-  throw ValueError(
+  const std::string meant = base::did_you_mean(name, names);
+  throw base::ValueError(
       fmt::format("there is no channel '{}' to capture{}", name,
                   meant.empty() ? fmt::format("; channels are {}", fmt::join(names, ", ")) : meant));
 }
@@ -44,7 +44,7 @@ Assignment assignment(double value) {
   const Parameter parameter = Parameter::of<name>();
   const firmware::Entry& entry = parameter.definition();
   if (!(value >= entry.minimum && value <= entry.maximum))
-    throw ValueError(
+    throw base::ValueError(
         fmt::format("{}: {} is not allowed; it can be {}", parameter.name(), value, allowed_text(parameter)));
   return {parameter, firmware::raw_from_number(entry.type, value)};
 }
@@ -59,14 +59,14 @@ std::uint32_t samples_of(const CaptureSettings& settings) {
 
 void check(const CaptureSettings& settings) {
   if (settings.channels.empty() || settings.channels.size() > firmware::capture_channels_max)
-    throw ValueError(fmt::format("{} channels are to be captured; it can be 1 to {}",
-                                 settings.channels.size(), firmware::capture_channels_max));
+    throw base::ValueError(fmt::format("{} channels are to be captured; it can be 1 to {}",
+                                       settings.channels.size(), firmware::capture_channels_max));
   if (settings.samples > samples_that_fit(settings))
-    throw ValueError(fmt::format(
+    throw base::ValueError(fmt::format(
         "{} samples of {} channels do not fit into the device's {} values; at most {} do", settings.samples,
         settings.channels.size(), firmware::capture_words, samples_that_fit(settings)));
   if (settings.pre_trigger >= samples_of(settings))
-    throw ValueError(
+    throw base::ValueError(
         fmt::format("{} samples before the trigger leave none for the trigger's own among {}; at most {} can "
                     "be before it",
                     settings.pre_trigger, samples_of(settings), samples_of(settings) - 1));
@@ -123,8 +123,8 @@ CaptureTrigger capture_trigger_of(std::string_view name) {
   for (const auto& trigger : firmware::names::capture_trigger) {
     if (trigger.name == name) return static_cast<CaptureTrigger>(trigger.value);
   }
-  throw ValueError(fmt::format("there is no trigger '{}'; triggers are {}", name,
-                               fmt::join(capture_trigger_names(), ", ")));
+  throw base::ValueError(fmt::format("there is no trigger '{}'; triggers are {}", name,
+                                     fmt::join(capture_trigger_names(), ", ")));
 }
 
 const std::vector<double>& Captured::column(std::string_view name) const {
@@ -133,7 +133,7 @@ const std::vector<double>& Captured::column(std::string_view name) const {
     if (one.name == name) return one.values;
     names.push_back(one.name);
   }
-  throw ValueError(fmt::format("'{}' was not captured, but {}", name, fmt::join(names, ", ")));
+  throw base::ValueError(fmt::format("'{}' was not captured, but {}", name, fmt::join(names, ", ")));
 }
 
 CaptureReader::~CaptureReader() {
@@ -156,10 +156,10 @@ void CaptureReader::arm(const CaptureSettings& settings) {
   running_ = true;
   try {
     command(device_, CaptureCommand::arm);
-  } catch (const link::RefusedError& error) {
+  } catch (const device::RefusedError& error) {
     running_ = false;
-    throw DeviceError(fmt::format("{}: the capture could not be armed: {}", device_.description(),
-                                  refusal_words(device_.last_refusal().reason, error)));
+    throw base::DeviceError(fmt::format("{}: the capture could not be armed: {}", device_.description(),
+                                        refusal_words(device_.last_refusal().reason, error)));
   }
 }
 
@@ -182,8 +182,8 @@ std::optional<CaptureProgress> CaptureReader::look() {
   if (now.state == CaptureState::complete || now.state == CaptureState::idle) running_ = false;
   if (now.state == CaptureState::complete) return std::nullopt;
   if (now.state == CaptureState::idle)
-    throw DeviceError(fmt::format("{}: the capture was stopped by another program, or the device restarted",
-                                  device_.description()));
+    throw base::DeviceError(fmt::format(
+        "{}: the capture was stopped by another program, or the device restarted", device_.description()));
   return CaptureProgress{now.state == CaptureState::running ? Phase::running : Phase::waiting, now.taken,
                          samples_of(settings_)};
 }
@@ -210,8 +210,9 @@ void CaptureReader::wait(microseconds patience, const ReportProgress& report) {
     if (device_.link().now() >= deadline) {
       stop();
       if (!triggered) fail_without_trigger(patience);
-      throw DeviceError(fmt::format("{}: the capture stands still at {} of {} samples: the axis has no ticks",
-                                    device_.description(), progress->done, all));
+      throw base::DeviceError(
+          fmt::format("{}: the capture stands still at {} of {} samples: the axis has no ticks",
+                      device_.description(), progress->done, all));
     }
     device_.link().wait(std::min<microseconds>(capture_poll_interval, deadline - device_.link().now()));
   }
@@ -222,7 +223,7 @@ void CaptureReader::fail_without_trigger(microseconds patience) {
   std::string level;
   if (settings_.trigger == CaptureTrigger::force) level = fmt::format(" above {} N", settings_.level);
   if (settings_.trigger == CaptureTrigger::velocity) level = fmt::format(" above {} m/s", settings_.level);
-  throw DeviceError(
+  throw base::DeviceError(
       fmt::format("{}: the trigger '{}'{} did not come within {} s; the capture has been stopped",
                   device_.description(), name_of(settings_.trigger), level, seconds));
 }
@@ -230,13 +231,13 @@ void CaptureReader::fail_without_trigger(microseconds patience) {
 Captured CaptureReader::read(const ReportProgress& report) {
   const Status before = status();
   if (before.state != CaptureState::complete)
-    throw DeviceError(fmt::format("{}: there is no complete capture to read, but one that is {}",
-                                  device_.description(),
-                                  firmware::names::capture_state[static_cast<std::size_t>(before.state) %
-                                                                 std::size(firmware::names::capture_state)]
-                                      .name));
+    throw base::DeviceError(
+        fmt::format("{}: there is no complete capture to read, but one that is {}", device_.description(),
+                    firmware::names::capture_state[static_cast<std::size_t>(before.state) %
+                                                   std::size(firmware::names::capture_state)]
+                        .name));
   const auto taken_away = [this] {
-    return DeviceError(
+    return base::DeviceError(
         fmt::format("{}: another program has taken the device's capture; try again", device_.description()));
   };
   if (before.channels != channels_.size() || before.taken > samples_of(settings_)) throw taken_away();
@@ -247,7 +248,7 @@ Captured CaptureReader::read(const ReportProgress& report) {
       report_if_asked(report,
                       {Phase::reading, static_cast<std::uint32_t>(done), static_cast<std::uint32_t>(all)});
     });
-  } catch (const link::RefusedError&) {
+  } catch (const device::RefusedError&) {
     throw taken_away();
   }
   if (status() != before) throw taken_away();

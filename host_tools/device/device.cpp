@@ -8,7 +8,7 @@
 
 namespace kmax::device {
 
-using link::RefusedError;
+using device::RefusedError;
 
 namespace {
 std::string version_text(std::uint32_t version) {
@@ -16,7 +16,7 @@ std::string version_text(std::uint32_t version) {
 }
 }  // namespace
 
-Device::Device(std::unique_ptr<link::Link> link, link::Notice notice)
+Device::Device(std::unique_ptr<device::Link> link, device::Notice notice)
     : link_(std::move(link)), notice_(std::move(notice)) {
   check_dictionary();
 }
@@ -29,11 +29,11 @@ void Device::check_dictionary() {
     if (checksum == firmware::dictionary_checksum) return;
     version = read(Parameter::of<"info.firmware_version">());
   } catch (const RefusedError& error) {
-    throw DeviceError(
+    throw base::DeviceError(
         fmt::format("{}: a device answers, but not as a Kmax controller does ({}); check unit and address",
                     description(), error.what()));
   }
-  throw DeviceError(fmt::format(
+  throw base::DeviceError(fmt::format(
       "{}: the device's parameters are not those this program knows (its firmware {} has dictionary {:08X}, "
       "this program has {:08X}); flash the firmware of this program's release, or use the kmax of the "
       "device's release",
@@ -60,11 +60,11 @@ double Device::count_length(std::size_t axis) {
 }
 
 void Device::write(const Parameter& parameter, std::uint32_t raw, bool idempotent) {
-  const link::SlotValue value{parameter.slot(), raw};
-  link_->write({&value, 1}, idempotent ? link::Repeat::if_lost : link::Repeat::never);
+  const device::SlotValue value{parameter.slot(), raw};
+  link_->write({&value, 1}, idempotent ? device::Repeat::if_lost : device::Repeat::never);
 }
 
-std::string refusal_words(firmware::Refusal reason, const link::RefusedError& error) {
+std::string refusal_words(firmware::Refusal reason, const device::RefusedError& error) {
   if (reason == firmware::Refusal::none) return error.what();
   return fmt::format("the device refused: {}", firmware::to_string(reason));
 }

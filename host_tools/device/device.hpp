@@ -24,16 +24,16 @@ struct RefusalReport {
 
 /// Why a write was refused: the device's reason; if it shows none, since another program has written
 /// meanwhile, what the link said.
-std::string refusal_words(firmware::Refusal reason, const link::RefusedError& error);
+std::string refusal_words(firmware::Refusal reason, const device::RefusedError& error);
 
 /// A Kmax device by the names of its object dictionary.
 ///
 /// The constructor makes sure that device and program have the same dictionary. Values are 32-bit patterns
 /// as firmware/object_dictionary defines them (value_text.hpp writes and reads them).
-/// Errors: DeviceError, ValueError, and link::LinkError from every call that talks to the device.
+/// Errors: DeviceError, ValueError, and device::LinkError from every call that talks to the device.
 class Device {
  public:
-  explicit Device(std::unique_ptr<link::Link> link, link::Notice notice = {});
+  explicit Device(std::unique_ptr<device::Link> link, device::Notice notice = {});
 
   /// In the order asked, in as few requests as the link allows. Over Modbus values of one group are read in
   /// one request and thus belong together.
@@ -47,8 +47,8 @@ class Device {
   /// rounded to float.
   double count_length(std::size_t axis);
 
-  /// Writes one value by itself, at once: for commands. A refusal is a link::RefusedError. `idempotent`: as
-  /// link::Repeat::if_lost.
+  /// Writes one value by itself, at once: for commands. A refusal is a device::RefusedError. `idempotent`: as
+  /// device::Repeat::if_lost.
   void write(const Parameter& parameter, std::uint32_t raw, bool idempotent);
 
   /// Sets all values in one tick of the device or none of them, and reads them back.
@@ -68,7 +68,7 @@ class Device {
   /// Texts of the link's device identification; empty if there are none.
   std::map<std::string, std::string> identify() { return link_->identify(); }
   std::string description() const { return link_->description(); }
-  link::Link& link() { return *link_; }
+  device::Link& link() { return *link_; }
 
  private:
   class Transaction;
@@ -87,8 +87,8 @@ class Device {
   [[noreturn]] void fail_refused(std::span<const Assignment> assignments, const RefusalReport& report,
                                  const std::string& words);
 
-  std::unique_ptr<link::Link> link_;
-  link::Notice notice_;
+  std::unique_ptr<device::Link> link_;
+  device::Notice notice_;
 };
 
 }  // namespace kmax::device

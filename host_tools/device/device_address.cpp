@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <vector>
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 using firmware::Entry;
@@ -152,4 +152,4 @@ std::optional<std::string> device_address_of_environment() {
   return text;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -8,7 +8,7 @@
 
 #include "firmware/object_dictionary/dictionary.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// An address that cannot be meant; the message says what is allowed.
 class AddressError : public std::invalid_argument {
@@ -53,4 +53,4 @@ std::string text_of(const DeviceAddress& address);
 /// KMAX_DEVICE, if it is set and not empty.
 std::optional<std::string> device_address_of_environment();
 
-}  // namespace kmax::link
+}  // namespace kmax::device

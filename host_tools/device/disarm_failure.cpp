@@ -11,7 +11,7 @@ std::string words_for_disarm_failure(double link_timeout, std::string_view why) 
                                          : fmt::format("the axis could not be disarmed ({})", why);
   if (link_timeout > 0)
     return fmt::format("{}; link.timeout removes its force after {} s without a message", failed,
-                       number_text(static_cast<float>(link_timeout)));
+                       base::number_text(static_cast<float>(link_timeout)));
   return failed + "; link.timeout is 0: its force MAY STILL BE ON, cut its power";
 }
 

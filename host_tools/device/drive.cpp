@@ -78,8 +78,8 @@ std::string DriveStatus::fault_words() const {
     return fmt::format("error code 0x{:04X}, which this program does not know", error_code);
   std::string words(text->what);
   if (!text->unit.empty())
-    words += fmt::format(" ({} {}, bound {} {})", number_text(fault_value), text->unit,
-                         number_text(fault_bound), text->unit);
+    words += fmt::format(" ({} {}, bound {} {})", base::number_text(fault_value), text->unit,
+                         base::number_text(fault_bound), text->unit);
   if (gate_driver_faults)
     words += fmt::format("; this axis' driver says: {}", gate_driver_words(*gate_driver_faults));
   if (!text->check.empty()) words += fmt::format("; {}", text->check);
@@ -157,9 +157,9 @@ firmware::GuardFinding Drive::guard() {
 void Drive::command(std::uint16_t controlword, bool idempotent) {
   try {
     device_.write(Parameter::of<"drive.controlword">(axis_), controlword, idempotent);
-  } catch (const link::RefusedError& error) {
-    throw DeviceError(fmt::format("axis {}: controlword {}: {}", axis_, controlword,
-                                  refusal_words(device_.last_refusal().reason, error)));
+  } catch (const device::RefusedError& error) {
+    throw base::DeviceError(fmt::format("axis {}: controlword {}: {}", axis_, controlword,
+                                        refusal_words(device_.last_refusal().reason, error)));
   }
 }
 
@@ -179,10 +179,11 @@ DriveStatus Drive::wait_until(Predicate done) {
 void Drive::advance(std::uint16_t controlword, DriveState wanted) {
   command(controlword, true);
   const auto seen = wait_until([wanted](const DriveStatus& s) { return s.state() == wanted || s.faulty(); });
-  if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
+  if (seen.faulty()) throw base::DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
   if (seen.state() != wanted)
-    throw DeviceError(fmt::format("axis {}: stays in '{}' instead of going to '{}'; look at 'kmax state'",
-                                  axis_, to_string(seen.state()), to_string(wanted)));
+    throw base::DeviceError(
+        fmt::format("axis {}: stays in '{}' instead of going to '{}'; look at 'kmax state'", axis_,
+                    to_string(seen.state()), to_string(wanted)));
 }
 
 std::string Drive::way_out() {
@@ -212,16 +213,18 @@ void Drive::enable() {
     return s.armed() || s.faulty() || (judged && s.refusal != Refusal::none);
   });
   if (seen.armed()) return;
-  if (seen.faulty()) throw DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
+  if (seen.faulty()) throw base::DeviceError(fmt::format("axis {}: {}", axis_, seen.fault_words()));
   if (seen.refusal == Refusal::guard_refused) {
     // Empty if somebody has mended it meanwhile.
     if (const std::string words = guard_words(guard()); !words.empty())
-      throw DeviceError(fmt::format("axis {} was not armed: refused: stability check: {}", axis_, words));
+      throw base::DeviceError(
+          fmt::format("axis {} was not armed: refused: stability check: {}", axis_, words));
   }
   if (seen.refusal != Refusal::none)
-    throw DeviceError(fmt::format("axis {} was not armed: {}{}", axis_, firmware::to_string(seen.refusal),
-                                  seen.refusal == Refusal::handle_inside_wall ? way_out() : std::string()));
-  throw DeviceError(
+    throw base::DeviceError(
+        fmt::format("axis {} was not armed: {}{}", axis_, firmware::to_string(seen.refusal),
+                    seen.refusal == Refusal::handle_inside_wall ? way_out() : std::string()));
+  throw base::DeviceError(
       fmt::format("axis {} was not armed: it stays in '{}' and gives no reason; look at 'kmax state'", axis_,
                   to_string(seen.state())));
 }
@@ -230,8 +233,8 @@ void Drive::arm() {
   const DriveStatus before = status();
   if (before.armed()) return;
   if (before.faulty())
-    throw DeviceError(fmt::format("axis {} cannot be armed, it has a fault: {}; then 'kmax clear'", axis_,
-                                  before.fault_words()));
+    throw base::DeviceError(fmt::format("axis {} cannot be armed, it has a fault: {}; then 'kmax clear'",
+                                        axis_, before.fault_words()));
   try {
     advance(word::disable_voltage, DriveState::switch_on_disabled);
     advance(word::shutdown, DriveState::ready_to_switch_on);
@@ -254,8 +257,8 @@ void Drive::disarm() {
     return s.state() == DriveState::switch_on_disabled || s.state() == DriveState::fault;
   });
   if (seen.state() == DriveState::switch_on_disabled || seen.state() == DriveState::fault) return;
-  throw DeviceError(fmt::format("axis {} is not disarmed: it stays in '{}'; cut its power", axis_,
-                                to_string(seen.state())));
+  throw base::DeviceError(fmt::format("axis {} is not disarmed: it stays in '{}'; cut its power", axis_,
+                                      to_string(seen.state())));
 }
 
 void Drive::stop() {
@@ -266,8 +269,8 @@ void Drive::stop() {
   };
   const auto seen = wait_until(stopped);
   if (!stopped(seen))
-    throw DeviceError(fmt::format("axis {} is not stopped: it stays in '{}'; cut its power", axis_,
-                                  to_string(seen.state())));
+    throw base::DeviceError(fmt::format("axis {} is not stopped: it stays in '{}'; cut its power", axis_,
+                                        to_string(seen.state())));
 }
 
 bool Drive::clear() {
@@ -281,7 +284,7 @@ bool Drive::clear() {
   const auto seen = wait_until([](const DriveStatus& s) { return !s.faulty(); });
   command(word::disable_voltage, true);
   if (!seen.faulty()) return true;
-  throw DeviceError(fmt::format("axis {}: the fault remains: {}", axis_, seen.fault_words()));
+  throw base::DeviceError(fmt::format("axis {}: the fault remains: {}", axis_, seen.fault_words()));
 }
 
 }  // namespace kmax::device

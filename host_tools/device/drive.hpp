@@ -54,7 +54,7 @@ inline firmware::Fault fault_of(const DriveStatus& status) {
 /// The CiA 402 drive of one axis: force only while it is armed ("operation enabled").
 ///
 /// Each call writes controlwords and waits, at most a second, until the statusword shows the state.
-/// Errors: DeviceError with the reason in words, link::LinkError.
+/// Errors: DeviceError with the reason in words, device::LinkError.
 class Drive {
  public:
   Drive(Device& device, std::size_t axis) : device_(device), axis_(axis) {}

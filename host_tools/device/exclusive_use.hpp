@@ -6,7 +6,7 @@
 
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Something that one program at a time may talk to (a serial port, a node on a bus), and how programs that
 /// respect each other take turns: who comes second waits a moment, says so, and then gives up; who has it
@@ -64,4 +64,4 @@ class ExclusiveUse {
   using Clock = std::chrono::steady_clock;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

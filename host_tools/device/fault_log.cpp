@@ -17,7 +17,7 @@ namespace {
 /// Read in pieces, an entry may be replaced meanwhile.
 constexpr int attempts = 3;
 
-LogEntry read_entry(link::Link& link, std::size_t place) {
+LogEntry read_entry(device::Link& link, std::size_t place) {
   for (int attempt = 0; attempt < attempts; ++attempt) {
     const auto all = link.read_log_entry(place);
     if (std::ranges::all_of(all, [](std::uint32_t word) { return word == 0; })) return {};
@@ -25,14 +25,14 @@ LogEntry read_entry(link::Link& link, std::size_t place) {
     std::copy_n(all.begin(), words.size(), words.begin());
     if (all.back() == firmware::log_crc(words)) return std::bit_cast<LogEntry>(words);
   }
-  throw DeviceError(fmt::format(
+  throw base::DeviceError(fmt::format(
       "{}: place {} of the fault log holds no whole entry in {} attempts: its checksum is wrong; erase the "
       "log with 'kmax faults --clear'",
       link.description(), place, attempts));
 }
 }  // namespace
 
-std::vector<LogEntry> read_fault_log(link::Link& link) {
+std::vector<LogEntry> read_fault_log(device::Link& link) {
   std::vector<LogEntry> entries;
   for (std::size_t place = 0; place < firmware::fault_log_entries; ++place) {
     const LogEntry entry = read_entry(link, place);
@@ -48,8 +48,8 @@ std::vector<LogEntry> read_fault_log(link::Link& link) {
 void erase_fault_log(Device& device) {
   try {
     device.write(Parameter::of<"log.command">(), 1, true);
-  } catch (const link::RefusedError& error) {
-    throw DeviceError(
+  } catch (const device::RefusedError& error) {
+    throw base::DeviceError(
         fmt::format("the fault log was not erased: {}", refusal_words(device.last_refusal().reason, error)));
   }
 }

@@ -10,9 +10,9 @@ namespace kmax::device {
 
 /// The device's fault log (firmware/command/fault_log.hpp), the newest entry first; each is whole. Errors:
 /// DeviceError, and as Link.
-std::vector<firmware::LogEntry> read_fault_log(link::Link& link);
+std::vector<firmware::LogEntry> read_fault_log(device::Link& link);
 
-/// Refused while an axis is armed. Errors: DeviceError, link::LinkError.
+/// Refused while an axis is armed. Errors: DeviceError, device::LinkError.
 void erase_fault_log(Device& device);
 
 /// s since the start that the entry names: of a trip to the tick, which is 32 bits wide and wraps after 60 h.

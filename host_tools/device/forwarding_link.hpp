@@ -11,7 +11,7 @@
 
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Hands everything on to the link beneath, which belongs to somebody else: for an owner that wants a link of
 /// its own, and for links that do one thing differently.
@@ -49,4 +49,4 @@ class ForwardingLink : public Link {
   Link& beneath_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

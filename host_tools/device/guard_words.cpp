@@ -104,8 +104,8 @@ std::string guard_words(const GuardFinding& finding) {
   const std::string_view relation = finding.value > finding.bound ? "exceeds" : "must be below";
   const std::string_view unit = unit_of(finding.criterion);
   return fmt::format("{} {} {} {} {} {} ({}); {}{} ('kmax check' explains)", words.subject,
-                     number_text(finding.value), unit, relation, number_text(finding.bound), unit, words.rule,
-                     remedy_for(finding), others_failed(finding));
+                     base::number_text(finding.value), unit, relation, base::number_text(finding.bound), unit,
+                     words.rule, remedy_for(finding), others_failed(finding));
 }
 
 }  // namespace kmax::device

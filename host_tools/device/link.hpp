@@ -13,7 +13,7 @@
 
 #include "firmware/parameters/parameter_values.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// No conversation is possible: the port cannot be opened, vanished, or nobody answers. The message says
 /// what happened, on which port, and what to look at.
@@ -119,4 +119,4 @@ class PeriodicYield {
   std::chrono::microseconds last_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -43,14 +43,14 @@ void Lock::write(const Parameter& parameter, std::uint32_t value, LockState want
   std::string lost;
   try {
     device_.write(parameter, value, false);
-  } catch (const link::RefusedError& error) {
+  } catch (const device::RefusedError& error) {
     const Refusal reason = device_.last_refusal().reason;
     const LockStatus now = status();
     std::string text = fmt::format("{}: {}", what, refusal_words(reason, error));
     if (reason == Refusal::wrong_code || reason == Refusal::code_waits)
       text += fmt::format("; {}, the next one is taken in {} s", wrong_codes(now.attempts), now.wait_s);
-    throw DeviceError(text);
-  } catch (const link::LinkError& error) {
+    throw base::DeviceError(text);
+  } catch (const device::LinkError& error) {
     lost = error.what();
   }
   const auto start = device_.link().now();
@@ -58,7 +58,7 @@ void Lock::write(const Parameter& parameter, std::uint32_t value, LockState want
   StoreState store_state = store.status().state;
   while (store_state == StoreState::busy) {
     if (device_.link().now() - start > patience)
-      throw DeviceError(
+      throw base::DeviceError(
           fmt::format("{}: the device is still writing its memory after {} s; 'kmax info' tells "
                       "what comes of it",
                       what, patience.count() / 1000));
@@ -72,14 +72,14 @@ void Lock::write(const Parameter& parameter, std::uint32_t value, LockState want
     device_.link().wait(poll_interval);
   }
   if (now.state == wanted) return;
-  if (!lost.empty()) throw link::LinkError(fmt::format("{}; {}; try again", lost, what));
+  if (!lost.empty()) throw device::LinkError(fmt::format("{}; {}; try again", lost, what));
   if (store_state == StoreState::failed)
-    throw DeviceError(
+    throw base::DeviceError(
         fmt::format("{}: the memory did not take it; try again, and if that fails too the "
                     "board's flash is worn out",
                     what));
-  throw DeviceError(fmt::format("{}: the device took it, but is {}: another program is at its lock", what,
-                                lock_words(now)));
+  throw base::DeviceError(fmt::format("{}: the device took it, but is {}: another program is at its lock",
+                                      what, lock_words(now)));
 }
 
 void Lock::set_code(std::uint32_t code) {

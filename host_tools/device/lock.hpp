@@ -22,7 +22,7 @@ std::string lock_words(const LockStatus& status);
 /// The device's write lock (firmware/command/write_lock.hpp). No message of an error holds a code.
 ///
 /// If an answer is lost, the device's own state tells whether the request was carried out.
-/// Errors: DeviceError with the reason in words, link::LinkError.
+/// Errors: DeviceError with the reason in words, device::LinkError.
 class Lock {
  public:
   static constexpr std::uint32_t no_code = 0;

@@ -66,7 +66,7 @@ const std::vector<Parameter>& all_parameters() {
 
 std::vector<std::string> suggest(std::string_view name) {
   const SplitName parts = split(name);
-  auto names = closest(parts.rest, dictionary_names());
+  auto names = base::closest(parts.rest, dictionary_names());
   if (!parts.axis || *parts.axis >= axis_count) return names;
   for (std::string& one : names) {
     if (firmware::entry_at(firmware::find_entry(one)).scope() == firmware::Scope::axis)
@@ -80,19 +80,21 @@ Parameter resolve(std::string_view name, std::size_t default_axis) {
   const std::size_t entry = firmware::find_entry(parts.rest);
   if (entry == firmware::entry_count) {
     if (is_group(parts.rest))
-      throw ValueError(fmt::format("'{}' is a group of parameters; 'kmax list {}.' shows them", name, name));
+      throw base::ValueError(
+          fmt::format("'{}' is a group of parameters; 'kmax list {}.' shows them", name, name));
     const auto names = suggest(name);
-    throw ValueError(fmt::format("there is no parameter '{}'{}", name,
-                                 names.empty()
-                                     ? "; 'kmax list' shows all of them"
-                                     : fmt::format("; did you mean {}?", fmt::join(names, " or "))));
+    throw base::ValueError(fmt::format("there is no parameter '{}'{}", name,
+                                       names.empty()
+                                           ? "; 'kmax list' shows all of them"
+                                           : fmt::format("; did you mean {}?", fmt::join(names, " or "))));
   }
   const auto& definition = firmware::entry_at(entry);
   if (parts.axis && *parts.axis >= axis_count)
-    throw ValueError(fmt::format("'{}': there is no such axis; axes are 0 .. {}", name, axis_count - 1));
+    throw base::ValueError(
+        fmt::format("'{}': there is no such axis; axes are 0 .. {}", name, axis_count - 1));
   if (parts.axis && definition.scope() == firmware::Scope::device)
-    throw ValueError(fmt::format("'{}': {} belongs to the whole device, not to an axis; write {}", name,
-                                 parts.rest, parts.rest));
+    throw base::ValueError(fmt::format("'{}': {} belongs to the whole device, not to an axis; write {}", name,
+                                       parts.rest, parts.rest));
   return {entry, parts.axis.value_or(default_axis)};
 }
 

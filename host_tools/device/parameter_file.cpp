@@ -75,14 +75,14 @@ class FileReader {
 
   std::vector<FileSetting> read(std::string_view text) {
     refuse_cut_off(text);
-    const toml::table root = base::parsed_toml<ValueError>(text, source_);
+    const toml::table root = base::parsed_toml<base::ValueError>(text, source_);
     read_table(root, "");
     std::sort(settings_.begin(), settings_.end(),
               [](const Placed& a, const Placed& b) { return a.place < b.place; });
     refuse_repeated();
-    if (!problems_.empty()) throw ValueError(all_messages());
+    if (!problems_.empty()) throw base::ValueError(all_messages());
     if (settings_.empty())
-      throw ValueError(fmt::format(
+      throw base::ValueError(fmt::format(
           "{}: it has no parameters; 'kmax dump FILE' writes a file that shows how they are written",
           source_));
     std::vector<FileSetting> found;
@@ -108,7 +108,7 @@ class FileReader {
   void refuse_cut_off(std::string_view text) const {
     if (!text.starts_with(dump_begin.substr(0, dump_begin.size() - 1))) return;
     if (text.find(dump_end.substr(0, dump_end.size() - 1)) != std::string_view::npos) return;
-    throw ValueError(fmt::format(
+    throw base::ValueError(fmt::format(
         "{}: it was cut off: it begins as a file of 'kmax dump', and the last line of one, '{}', is missing; "
         "dump it again, or take away its first line if this is all that you want",
         source_, dump_end.substr(0, dump_end.size() - 1)));
@@ -127,7 +127,7 @@ class FileReader {
         } else {
           settings_.push_back({place, assignment_of(name, node)});
         }
-      } catch (const ValueError& error) {
+      } catch (const base::ValueError& error) {
         problems_.push_back({place, error.what()});
       }
     }
@@ -135,8 +135,8 @@ class FileReader {
 
   static void check_group(const std::string& name) {
     if (std::find(groups().begin(), groups().end(), name) != groups().end()) return;
-    throw ValueError(
-        fmt::format("there is no group of parameters '{}'{}", name, did_you_mean(name, groups())));
+    throw base::ValueError(
+        fmt::format("there is no group of parameters '{}'{}", name, base::did_you_mean(name, groups())));
   }
 
   static std::string text_of(const Parameter& parameter, const toml::node& node) {
@@ -144,15 +144,15 @@ class FileReader {
     if (const auto* whole = node.as_integer()) return fmt::format("{}", whole->get());
     if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
     if (const auto* text = node.as_string()) return text->get();
-    throw ValueError(fmt::format("{}: a {} is not a value; allowed is {}", parameter.name(),
-                                 node.is_array() ? "list" : "date or time", allowed_text(parameter)));
+    throw base::ValueError(fmt::format("{}: a {} is not a value; allowed is {}", parameter.name(),
+                                       node.is_array() ? "list" : "date or time", allowed_text(parameter)));
   }
 
   static Assignment assignment_of(const std::string& name, const toml::node& node) {
     const Parameter parameter = resolve(name);
     const Assignment assignment = parse_assignments({name + "=" + text_of(parameter, node)}).front();
     if (!parameter.definition().persistent)
-      throw ValueError(
+      throw base::ValueError(
           fmt::format("{}: 'kmax save' does not keep it, so it has no place in a file of parameters; set it "
                       "with 'kmax set'",
                       parameter.name()));
@@ -229,7 +229,7 @@ std::vector<FileSetting> parse_parameter_file(std::string_view text, const std::
 
 std::vector<FileSetting> read_parameter_file(const std::string& path) {
   return parse_parameter_file(
-      base::text_of<ValueError>(
+      base::text_of<base::ValueError>(
           path, "give the path of a file of parameters (TOML), as 'kmax dump FILE' writes it"),
       path);
 }

@@ -10,7 +10,7 @@
 #include "host_tools/base/toml_text.hpp"
 #include "host_tools/device/device_address.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 /// The specification ignores a path that is not absolute.
@@ -42,7 +42,7 @@ std::optional<std::string> default_device_address() {
       throw AddressError(
           fmt::format("{}: there is no setting '{}'{}; what may stand here is device = \"usb\", "
                       "\"serial:PATH\" or \"can:IFACE\"",
-                      file.string(), key.str(), device::did_you_mean(key.str(), keys)));
+                      file.string(), key.str(), base::did_you_mean(key.str(), keys)));
   }
   if (!table.contains(keys[0])) return std::nullopt;
   const auto address = table[keys[0]].value<std::string>();
@@ -52,4 +52,4 @@ std::optional<std::string> default_device_address() {
   return address;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

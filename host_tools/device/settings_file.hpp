@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Where a user's own defaults are: $XDG_CONFIG_HOME/kmax/config.toml, or ~/.config/kmax/config.toml (XDG
 /// Base Directory Specification 0.8). Empty where neither variable is set.
@@ -15,4 +15,4 @@ std::filesystem::path settings_file();
 /// another key, throws an AddressError that says which and what is allowed.
 std::optional<std::string> default_device_address();
 
-}  // namespace kmax::link
+}  // namespace kmax::device

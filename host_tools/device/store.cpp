@@ -9,9 +9,9 @@
 
 namespace kmax::device {
 
+using device::LinkError;
 using firmware::StoreCommand;
 using firmware::StoreState;
-using link::LinkError;
 using std::chrono::milliseconds;
 
 namespace {
@@ -81,8 +81,8 @@ StoreStatus Store::status() {
 void Store::command(StoreCommand wanted, const char* what) {
   try {
     device_.write(Parameter::of<"store.command">(), static_cast<std::uint32_t>(wanted), false);
-  } catch (const link::RefusedError& error) {
-    throw DeviceError(fmt::format("{}: {}", what, refusal_words(device_.last_refusal().reason, error)));
+  } catch (const device::RefusedError& error) {
+    throw base::DeviceError(fmt::format("{}: {}", what, refusal_words(device_.last_refusal().reason, error)));
   }
 }
 
@@ -92,7 +92,7 @@ StoreStatus Store::wait_until_done(const StoreStatus& before) {
     const StoreStatus seen = status();
     if (seen.state != StoreState::busy) return seen;
     if (device_.link().now() - start > save_patience)
-      throw DeviceError(fmt::format(
+      throw base::DeviceError(fmt::format(
           "the device is still saving after {} s; record {} is kept until it has done so, 'kmax info' tells",
           save_patience.count() / 1000, before.sequence));
     device_.link().wait(save_poll_interval);
@@ -120,7 +120,7 @@ StoreStatus Store::save() {
   const bool kept =
       after.state == StoreState::saved && after.unsaved_parameters == 0 && after.saved_parameters != 0;
   if (after.state == StoreState::failed || (after.sequence == before.sequence && !kept))
-    throw DeviceError(fmt::format(
+    throw base::DeviceError(fmt::format(
         "the memory did not take the parameters ({} words did not read back); {}; save again, and if that "
         "fails too the board's flash is worn out",
         after.write_errors - before.write_errors,
@@ -155,7 +155,7 @@ std::vector<Store::Change> Store::set_defaults() {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Parameter& parameter = parameters[i];
     if (!same_value(parameter, after[i], parameter.default_raw()))
-      throw DeviceError(fmt::format(
+      throw base::DeviceError(fmt::format(
           "{}: {} is {} instead of its default {}; try again, and end other programs that write to the "
           "device",
           lost.empty() ? "the defaults were set" : lost, parameter.name(),

@@ -27,7 +27,7 @@ std::string name_of_identity(std::uint32_t identity);
 std::vector<Parameter> persistent_parameters();
 
 /// Keeping parameters over a restart.
-/// Errors: DeviceError with the reason in words, link::LinkError.
+/// Errors: DeviceError with the reason in words, device::LinkError.
 class Store {
  public:
   explicit Store(Device& device) : device_(device) {}

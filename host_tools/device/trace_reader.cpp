@@ -49,7 +49,7 @@ void TraceReader::read(std::vector<TraceSample>& samples) {
     const auto slot = static_cast<std::uint32_t>(next_ % firmware::trace_capacity);
     const auto until_wrap = static_cast<std::uint32_t>(firmware::trace_capacity) - slot;
     const auto count =
-        std::min({available - next_, until_wrap, std::uint32_t{link::Link::trace_records_at_once}});
+        std::min({available - next_, until_wrap, std::uint32_t{device::Link::trace_records_at_once}});
     const auto words = device_.link().read_trace(slot, count);
     // Records near the end of the ring may have been overwritten while they were read. Later the ticks tell
     // which record it is, but the first one must be what it is taken for.

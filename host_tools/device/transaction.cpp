@@ -11,9 +11,9 @@
 
 namespace kmax::device {
 
+using device::LinkError;
+using device::RefusedError;
 using firmware::Refusal;
-using link::LinkError;
-using link::RefusedError;
 using std::chrono::milliseconds;
 
 namespace {
@@ -120,8 +120,8 @@ class Device::Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  void put_aside(std::span<const link::SlotValue> values) {
-    device_.link_->write(values, link::Repeat::never, [this] {
+  void put_aside(std::span<const device::SlotValue> values) {
+    device_.link_->write(values, device::Repeat::never, [this] {
       check_silence();
       last_write_ = device_.link_->now();
     });
@@ -140,7 +140,7 @@ class Device::Transaction {
  private:
   void check_silence() const {
     if (device_.link_->now() - last_write_ > silence_max)
-      throw StoodStill(
+      throw base::StoodStill(
           fmt::format("this program was stopped for too long while it was setting values; {}; try again",
                       nothing_changed));
   }
@@ -159,7 +159,7 @@ class Device::Transaction {
 };
 
 bool Device::transact(std::span<const Assignment> assignments, RefusalReport& report, std::string& words) {
-  std::vector<link::SlotValue> values;
+  std::vector<device::SlotValue> values;
   for (const auto& [parameter, raw] : assignments) values.push_back({parameter.slot(), raw});
   std::optional<Transaction>
       transaction;  // outlives the handler, which asks why before the answer is cleared
@@ -180,7 +180,7 @@ void Device::apply(std::span<const Assignment> assignments) {
   for (auto one = assignments.begin(); one != assignments.end(); ++one) {
     const auto same = [&](const Assignment& other) { return other.parameter == one->parameter; };
     if (std::any_of(assignments.begin(), one, same))
-      throw ValueError(fmt::format("{}: it is given twice", one->parameter.name()));
+      throw base::ValueError(fmt::format("{}: it is given twice", one->parameter.name()));
   }
   RefusalReport report;
   std::string words;
@@ -192,7 +192,7 @@ void Device::apply(std::span<const Assignment> assignments) {
       return settle_lost_commit(assignments, error.what());
     } catch (const LinkError& error) {
       if (attempt == commit_attempts) throw LinkError(fmt::format("{}; {}", error.what(), nothing_changed));
-    } catch (const StoodStill&) {
+    } catch (const base::StoodStill&) {
       if (attempt == commit_attempts) throw;
     }
   }
@@ -237,12 +237,12 @@ void Device::verify(std::span<const Assignment> assignments) {
   if (!difference) return;
   const Parameter& parameter = difference->wanted.parameter;
   if (difference->found == 0 && firmware::is_target(parameter.entry()))
-    throw DeviceError(
+    throw base::DeviceError(
         fmt::format("{} was set to {}, but is {} again: the device holds a target only while the axis is "
                     "armed with drive.mode torque; arm it first",
                     parameter.name(), value_with_unit(parameter, difference->wanted.raw),
                     value_with_unit(parameter, difference->found)));
-  throw DeviceError(
+  throw base::DeviceError(
       fmt::format("{} was set to {}, but the device now has {}: another program is writing to it; end that "
                   "one and try again",
                   parameter.name(), value_with_unit(parameter, difference->wanted.raw),
@@ -262,7 +262,7 @@ void Device::follow_serial_settings(std::span<const Assignment> assignments) {
 void Device::fail_refused(std::span<const Assignment> assignments, const RefusalReport& report,
                           const std::string& words) {
   if (report.reason == Refusal::no_transaction)
-    throw DeviceError(
+    throw base::DeviceError(
         "the device dropped the transaction because its values came too slowly; some of them may be set, "
         "'kmax get' tells");
   std::string about, numbers;
@@ -282,8 +282,8 @@ void Device::fail_refused(std::span<const Assignment> assignments, const Refusal
     if (report.reason == Refusal::only_tightens) numbers = direction_words(*this, *owner);
   }
   const std::string message = fmt::format("{}{}{}; {}", about, words, numbers, nothing_changed);
-  if (is_about_values(report.reason)) throw ValueError(message);
-  throw DeviceError(message);
+  if (is_about_values(report.reason)) throw base::ValueError(message);
+  throw base::DeviceError(message);
 }
 
 }  // namespace kmax::device

@@ -8,7 +8,7 @@
 
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 using usb::UsbDevice;
 
@@ -88,4 +88,4 @@ const UsbDevice* usb_device_of(const DeviceAddress& address, std::span<const Usb
   return nullptr;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

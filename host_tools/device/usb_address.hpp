@@ -6,7 +6,7 @@
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/usb/usb_devices.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Where the device of a usb address has its serial port now. LinkError: there is none, there are several, it
 /// has no port; the message says what to do.
@@ -19,4 +19,4 @@ const usb::UsbDevice* usb_device_of(const DeviceAddress& address, std::span<cons
 /// "usb:1F2E3D4C, usb:5A6B7C8D": the Kmax devices among these.
 std::string usb_addresses(std::span<const usb::UsbDevice> devices);
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -19,7 +19,7 @@ using firmware::Type;
 
 namespace {
 std::string bound_text(const Entry& entry, double bound) {
-  return entry.type == Type::float32 ? number_text(bound) : fmt::format("{:.0f}", bound);
+  return entry.type == Type::float32 ? base::number_text(bound) : fmt::format("{:.0f}", bound);
 }
 
 std::vector<std::string> choice_names(const Entry& entry) {
@@ -29,27 +29,28 @@ std::vector<std::string> choice_names(const Entry& entry) {
 }
 
 [[noreturn]] void fail(const Parameter& parameter, const std::string& what) {
-  throw ValueError(fmt::format("{}: {}", parameter.name(), what));
+  throw base::ValueError(fmt::format("{}: {}", parameter.name(), what));
 }
 
-WrittenNumber parse_number(const Parameter& parameter, std::string_view text) {
+base::WrittenNumber parse_number(const Parameter& parameter, std::string_view text) {
   const Entry& entry = parameter.definition();
   const std::string allowed = allowed_text(parameter);
   try {
-    return written_number(text, entry.unit,
-                          entry.values.empty() ? "a number" : fmt::format("one of {}", allowed), allowed);
-  } catch (const ValueError& error) {
+    return base::written_number(
+        text, entry.unit, entry.values.empty() ? "a number" : fmt::format("one of {}", allowed), allowed);
+  } catch (const base::ValueError& error) {
     fail(parameter, error.what());
   }
 }
 
-[[noreturn]] void fail_out_of_range(const Parameter& parameter, const WrittenNumber& number) {
+[[noreturn]] void fail_out_of_range(const Parameter& parameter, const base::WrittenNumber& number) {
   const Entry& entry = parameter.definition();
   const bool above = number.value > entry.maximum;
-  fail(parameter, fmt::format("{} is {} allowed value {} ({} .. {})", number.as_given,
-                              above ? "above the largest" : "below the smallest",
-                              in_unit(bound_text(entry, above ? entry.maximum : entry.minimum), entry.unit),
-                              bound_text(entry, entry.minimum), bound_text(entry, entry.maximum)));
+  fail(parameter,
+       fmt::format("{} is {} allowed value {} ({} .. {})", number.as_given,
+                   above ? "above the largest" : "below the smallest",
+                   base::in_unit(bound_text(entry, above ? entry.maximum : entry.minimum), entry.unit),
+                   bound_text(entry, entry.minimum), bound_text(entry, entry.maximum)));
 }
 
 std::uint32_t parse_choice(const Parameter& parameter, std::string_view text) {
@@ -58,18 +59,18 @@ std::uint32_t parse_choice(const Parameter& parameter, std::string_view text) {
     if (choice.name == text) return static_cast<std::uint32_t>(choice.value);
   }
   if (text.find_first_of("0123456789") < 2) {
-    const WrittenNumber number = parse_number(parameter, text);
+    const base::WrittenNumber number = parse_number(parameter, text);
     for (const NamedValue& choice : entry.values) {
       if (static_cast<double>(choice.value) == number.value) return static_cast<std::uint32_t>(choice.value);
     }
   }
   fail(parameter, fmt::format("'{}' is not one of {}{}", text, allowed_text(parameter),
-                              did_you_mean(text, choice_names(entry))));
+                              base::did_you_mean(text, choice_names(entry))));
 }
 }  // namespace
 
 namespace {
-std::uint32_t raw_of(const Parameter& parameter, WrittenNumber number) {
+std::uint32_t raw_of(const Parameter& parameter, base::WrittenNumber number) {
   const Entry& entry = parameter.definition();
   if (entry.type != Type::float32) {
     if (number.value != std::floor(number.value))
@@ -93,20 +94,21 @@ std::uint32_t parse_here(const Parameter& parameter, std::string_view text, cons
   if (parameter.entry() != firmware::entry_of<"wall.position">())
     fail(parameter, fmt::format("'{}': only wall.position can be set from where the handle is", text));
   if (!here) fail(parameter, fmt::format("'{}' needs a device that knows where its handle is", text));
-  std::string offset(trimmed(text.substr(here_word.size())));
+  std::string offset(base::trimmed(text.substr(here_word.size())));
   if (!offset.empty() && !offset.starts_with('+') && !offset.starts_with('-'))
     fail(parameter, fmt::format("'{}': write here, here+5mm or here-5mm", text));
   if (offset.size() > 1)
-    offset = offset.substr(0, 1) + std::string(trimmed(std::string_view(offset).substr(1)));
+    offset = offset.substr(0, 1) + std::string(base::trimmed(std::string_view(offset).substr(1)));
   const double away = offset.empty() ? 0.0 : parse_number(parameter, offset).value;
   const double value = here(parameter.axis()) + away;
-  return raw_of(parameter, {value, fmt::format("{} = {}", text,
-                                               in_unit(number_text(value), parameter.definition().unit))});
+  return raw_of(parameter,
+                {value, fmt::format("{} = {}", text,
+                                    base::in_unit(base::number_text(value), parameter.definition().unit))});
 }
 }  // namespace
 
 std::uint32_t parse_value(const Parameter& parameter, std::string_view given) {
-  const std::string_view text = trimmed(given);
+  const std::string_view text = base::trimmed(given);
   if (text.empty())
     fail(parameter, fmt::format("the value is missing; allowed is {}", allowed_text(parameter)));
   if (!parameter.definition().values.empty()) return parse_choice(parameter, text);
@@ -119,8 +121,9 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
   for (const std::string& text : texts) {
     const auto equals = text.find('=');
     if (equals == std::string::npos)
-      throw ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
-    const Parameter parameter = resolve(trimmed(std::string_view(text).substr(0, equals)), default_axis);
+      throw base::ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
+    const Parameter parameter =
+        resolve(base::trimmed(std::string_view(text).substr(0, equals)), default_axis);
     if (parameter.definition().access == firmware::Access::communication)
       fail(parameter,
            fmt::format("it is one of CANopen's own settings, which a CANopen master writes by SDO to object "
@@ -142,7 +145,7 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
     for (const Assignment& other : assignments) {
       if (other.parameter == parameter) fail(parameter, "it is given twice");
     }
-    const std::string_view value = trimmed(std::string_view(text).substr(equals + 1));
+    const std::string_view value = base::trimmed(std::string_view(text).substr(equals + 1));
     assignments.push_back({parameter, value.starts_with(here_word) ? parse_here(parameter, value, here)
                                                                    : parse_value(parameter, value)});
   }
@@ -151,7 +154,7 @@ std::vector<Assignment> parse_assignments(const std::vector<std::string>& texts,
 
 std::string value_text(const Parameter& parameter, std::uint32_t raw) {
   const Entry& entry = parameter.definition();
-  if (entry.type == Type::float32) return number_text(std::bit_cast<float>(raw));
+  if (entry.type == Type::float32) return base::number_text(std::bit_cast<float>(raw));
   for (const NamedValue& choice : entry.values) {
     if (static_cast<std::uint32_t>(choice.value) == raw) return std::string(choice.name);
   }
@@ -159,13 +162,13 @@ std::string value_text(const Parameter& parameter, std::uint32_t raw) {
 }
 
 std::string value_with_unit(const Parameter& parameter, std::uint32_t raw) {
-  return in_unit(value_text(parameter, raw), parameter.definition().unit);
+  return base::in_unit(value_text(parameter, raw), parameter.definition().unit);
 }
 
 std::string allowed_text(const Parameter& parameter) {
   const Entry& entry = parameter.definition();
   if (entry.values.empty())
-    return in_unit(
+    return base::in_unit(
         fmt::format("{} .. {}", bound_text(entry, entry.minimum), bound_text(entry, entry.maximum)),
         entry.unit);
   return fmt::format("{}", fmt::join(choice_names(entry), ", "));

@@ -154,13 +154,13 @@ bool is_one_of(const std::string& name, const std::vector<std::string>& names) {
   const auto* known =
       std::find_if(reserved.begin(), reserved.end(), [&](const Reserved& one) { return one.name == name; });
   if (known != reserved.end())
-    throw device::ValueError(fmt::format("--set {}: not to be changed here; {}", name, known->why));
+    throw base::ValueError(fmt::format("--set {}: not to be changed here; {}", name, known->why));
   if (!parameter && is_one_of(name, names_of(Touching::simulated_person, varied)))
-    throw device::ValueError(fmt::format(
+    throw base::ValueError(fmt::format(
         "--set {}: it is simulated, and the device that --device names is as it is; leave one of them out",
         name));
-  throw device::ValueError(fmt::format("--set {}: no touch of this experiment goes by it; allowed are {}",
-                                       name, fmt::join(names_of(touching, varied), ", ")));
+  throw base::ValueError(fmt::format("--set {}: no touch of this experiment goes by it; allowed are {}", name,
+                                     fmt::join(names_of(touching, varied), ", ")));
 }
 
 /// The supplied scene of one person at a wall; with a structure where one is asked for.
@@ -203,7 +203,7 @@ void TouchChanges::read() {
     if (changes(one.parameter.name())) values.set_raw(one.parameter.slot(), one.raw);
   }
   if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
-    throw device::ValueError(fmt::format("--set: {}", firmware::to_string(broken.refusal)));
+    throw base::ValueError(fmt::format("--set: {}", firmware::to_string(broken.refusal)));
   loop_ = firmware::haptic_configuration(values, 0);
   scene_.parameters.clear();
 }

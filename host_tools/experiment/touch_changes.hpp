@@ -31,7 +31,7 @@ class TouchChanges {
  public:
   /// None.
   TouchChanges() = default;
-  /// "NAME=VALUE" each. Throws device::ValueError or simulation::SceneError: an unknown name or one given
+  /// "NAME=VALUE" each. Throws base::ValueError or simulation::SceneError: an unknown name or one given
   /// twice, one that is not to be changed here, a value that is not allowed, values that do not go together.
   TouchChanges(const std::vector<std::string>& texts, Touching touching,
                Varied varied = Varied::papers_walls);

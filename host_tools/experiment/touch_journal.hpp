@@ -61,12 +61,12 @@ Touch repeated_touch(const TouchSession& session, const std::string& name,
       if (touch.counts()) return touch;
       session.report(fmt::format("{}: {}; once more", name, reason_not_to_count(touch)));
       if (attempt++ == touch_attempts) return touch;
-    } catch (const device::DeviceError& error) {
+    } catch (const base::DeviceError& error) {
       // Nobody touches a wall whose force was removed unseen.
       if (was_cut_off(error)) continue;
       const bool nobody = dynamic_cast<const NobodyTouched*>(&error) != nullptr;
       if (!nobody || session.prompter == nullptr || attempt++ == touch_attempts) throw;
-    } catch (const link::LinkError& error) {
+    } catch (const device::LinkError& error) {
       if (!was_cut_off(error)) throw;
     }
   }

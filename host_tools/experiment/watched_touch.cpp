@@ -20,9 +20,9 @@ constexpr double shortest_round = 0.03;                    // s, from one look a
 constexpr double longest_timeout = 1.0;                    // s an axis may push that nobody watches
 
 /// Somebody came to the wall between the look and the arming, which was refused.
-class CameTooSoon : public device::DeviceError {
+class CameTooSoon : public base::DeviceError {
  public:
-  using device::DeviceError::DeviceError;
+  using base::DeviceError::DeviceError;
 };
 
 /// Removes the force of all axes whatever happens.
@@ -66,14 +66,14 @@ class ArmedAxes {
   static void arm(device::Drive& drive) {
     try {
       drive.arm();
-    } catch (const device::DeviceError& error) {
+    } catch (const base::DeviceError& error) {
       // What the device says: the handle may be out again by now.
       if (drive.status().refusal != firmware::Refusal::handle_inside_wall) throw;
       throw CameTooSoon(error.what());
     }
   }
   [[noreturn]] static void fail_without_force(std::size_t axis, const device::DriveStatus& status) {
-    throw device::DeviceError(
+    throw base::DeviceError(
         fmt::format("axis {} lost its force during the touch: {}", axis,
                     status.faulty() ? status.fault_words() : std::string(device::to_string(status.state()))));
   }
@@ -165,7 +165,7 @@ class Watch {
       if (touch_.aborted_at || over()) return;
       // Without this the axes would stay armed for ever.
       if (device_.link().now() - last_record > longest_silence)
-        throw device::DeviceError("the trace has stopped during the touch; does another program use it?");
+        throw base::DeviceError("the trace has stopped during the touch; does another program use it?");
       if (!touched() && now() > watch_.contact_patience)
         throw NobodyTouched(
             fmt::format("nobody touched the wall within {} s of arming; press the handle against it",

@@ -27,9 +27,9 @@
 namespace kmax::experiment {
 
 /// Nobody came to the wall in time. Worth another try, which no other error of a touch is.
-class NobodyTouched : public device::DeviceError {
+class NobodyTouched : public base::DeviceError {
  public:
-  using device::DeviceError::DeviceError;
+  using base::DeviceError::DeviceError;
 };
 
 inline constexpr double wall_settling = 0.5;  ///< s; a first bounce has died out then
@@ -83,9 +83,9 @@ using ReportText = std::function<void(const std::string&)>;
 /// Sets nothing but the changes; wall and law must be what they should be. `report`: progress, called about
 /// five times a second with a short text; what it throws ends the touch.
 ///
-/// Errors: std::invalid_argument (require_sound); NobodyTouched; device::DeviceError (a fault with its words,
+/// Errors: std::invalid_argument (require_sound); NobodyTouched; base::DeviceError (a fault with its words,
 /// a trace that stops, an axis that cannot be armed or disarmed; for the wall's axis, because the handle is
-/// inside, only after contact_patience), device::ValueError (a change), link::LinkError.
+/// inside, only after contact_patience), base::ValueError (a change), device::LinkError.
 WatchedTouch watch_touch(device::Device& device, const TouchWatch& watch, const ReportText& report);
 
 /// A parameter of one axis, by its name without prefix.

@@ -20,7 +20,7 @@ std::uint32_t word_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
          std::uint32_t{bytes[at + 3]} << 24U;
 }
 
-void check_place(const ElfSegment& segment, const std::string& name, const ChipMemory& memory) {
+void check_place(const base::ElfSegment& segment, const std::string& name, const ChipMemory& memory) {
   const std::uint64_t end = std::uint64_t{segment.address} + segment.bytes.size();
   const std::string text =
       fmt::format("a segment at 0x{:08x}, {} bytes,", segment.address, segment.bytes.size());
@@ -37,7 +37,7 @@ void check_place(const ElfSegment& segment, const std::string& name, const ChipM
 }
 
 /// An image may name the parameter sectors it was linked for.
-void check_parameter_symbols(const ElfImage& elf, const std::string& name, const ChipMemory& memory) {
+void check_parameter_symbols(const base::ElfImage& elf, const std::string& name, const ChipMemory& memory) {
   const auto begin = elf.symbol("kmax_parameters_begin");
   const auto end = elf.symbol("kmax_parameters_end");
   if ((begin && begin->address != memory.parameters_begin()) ||
@@ -83,15 +83,15 @@ std::uint32_t crc_of(const std::vector<std::uint8_t>& bytes) {
 
 FlashImage FlashImage::load(const std::filesystem::path& elf, const ChipMemory& memory) {
   try {
-    return from(ElfImage::load(elf), elf.string(), memory);
-  } catch (const ElfError& error) {
+    return from(base::ElfImage::load(elf), elf.string(), memory);
+  } catch (const base::ElfError& error) {
     throw ImageError(error.what());
   }
 }
 
-FlashImage FlashImage::from(const ElfImage& elf, const std::string& name, const ChipMemory& memory) {
+FlashImage FlashImage::from(const base::ElfImage& elf, const std::string& name, const ChipMemory& memory) {
   FlashImage image;
-  for (const ElfSegment& segment : elf.segments()) {
+  for (const base::ElfSegment& segment : elf.segments()) {
     check_place(segment, name, memory);
     if (!image.pieces_.empty() && segment.address < image.pieces_.back().end())
       refuse(name, fmt::format("two segments overlap at 0x{:08x}", segment.address));

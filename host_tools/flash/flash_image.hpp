@@ -39,7 +39,7 @@ class FlashImage {
   /// segments overlap, does not open flash with a plausible vector table, or was linked for other parameter
   /// sectors.
   static FlashImage load(const std::filesystem::path& elf, const ChipMemory& memory);
-  static FlashImage from(const ElfImage& elf, const std::string& name, const ChipMemory& memory);
+  static FlashImage from(const base::ElfImage& elf, const std::string& name, const ChipMemory& memory);
 
   /// By address; the first holds the vector table.
   const std::vector<FlashPiece>& pieces() const { return pieces_; }

@@ -19,8 +19,8 @@ Json fault_json(const DriveStatus& status) {
   return {
       {"name", text != nullptr ? std::string(text->name) : "unknown"},
       {"error_code", status.error_code},
-      {"value", has_number ? Json(device::shortest_double(status.fault_value)) : Json(nullptr)},
-      {"bound", has_number ? Json(device::shortest_double(status.fault_bound)) : Json(nullptr)},
+      {"value", has_number ? Json(base::shortest_double(status.fault_value)) : Json(nullptr)},
+      {"bound", has_number ? Json(base::shortest_double(status.fault_bound)) : Json(nullptr)},
       {"unit", has_number ? std::string(text->unit) : ""},
       {"gate_driver", status.gate_driver_faults ? Json(device::gate_driver_words(*status.gate_driver_faults))
                                                 : Json(nullptr)},
@@ -36,8 +36,8 @@ Json guard_json(const GuardFinding& guard) {
   return {{"pass", guard.verdict == GuardFinding::Verdict::pass},
           {"failed", failed},
           {"criterion", std::string(device::name_of(guard.criterion))},
-          {"value", device::shortest_double(guard.value)},
-          {"bound", device::shortest_double(guard.bound)},
+          {"value", base::shortest_double(guard.value)},
+          {"bound", base::shortest_double(guard.bound)},
           {"unit", std::string(device::unit_of(guard.criterion))},
           {"message", device::guard_words(guard)}};
 }

@@ -17,7 +17,7 @@ Json changes_json(const std::vector<check::Change>& changes) {
   Json all = Json::array();
   for (const check::Change& change : changes)
     all.push_back({{"parameter", change.parameter.name()},
-                   {"value", device::shortest_double(change.value)},
+                   {"value", base::shortest_double(change.value)},
                    {"unit", std::string(change.parameter.definition().unit)},
                    {"at_least", change.at_least},
                    {"only_if_true", change.fact}});

@@ -79,7 +79,7 @@ Json number_json(double number) {
 Json value_json(const device::Parameter& parameter, std::uint32_t raw) {
   const Entry& entry = parameter.definition();
   if (!entry.values.empty()) return device::value_text(parameter, raw);
-  if (entry.type == Type::float32) return number_json(device::shortest_double(std::bit_cast<float>(raw)));
+  if (entry.type == Type::float32) return number_json(base::shortest_double(std::bit_cast<float>(raw)));
   return number_json(firmware::number_from_raw(entry.type, raw));
 }
 

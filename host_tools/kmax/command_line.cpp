@@ -23,7 +23,7 @@
 namespace kmax::cli {
 
 namespace {
-int report_error(Context& context, const std::string& message, ExitCode code) {
+int report_error(Context& context, const std::string& message, base::ExitCode code) {
   context.note(message);
   if (context.json) context.print({{"error", message}});
   return code;
@@ -71,7 +71,7 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
     return fmt::format("a command is missing; commands are {}; 'kmax --help' explains them",
                        fmt::join(names, ", "));
   if (std::find(names.begin(), names.end(), word) == names.end()) {
-    const std::string meant = device::did_you_mean(word, names);
+    const std::string meant = base::did_you_mean(word, names);
     return fmt::format("there is no command '{}'{}", word,
                        meant.empty() ? fmt::format("; commands are {}", fmt::join(names, ", ")) : meant);
   }
@@ -93,23 +93,23 @@ int act(Context& context) {
     context.out.flush();
     if (!context.out) {
       context.note("the output could not be written; is the disk full or the pipe closed?");
-      return failed;
+      return base::failed;
     }
     return code;
   } catch (const UsageError& error) {
-    return report_error(context, error.what(), wrong_usage);
-  } catch (const device::ValueError& error) {
-    return report_error(context, error.what(), wrong_usage);
-  } catch (const link::AddressError& error) {
-    return report_error(context, error.what(), wrong_usage);
+    return report_error(context, error.what(), base::wrong_usage);
+  } catch (const base::ValueError& error) {
+    return report_error(context, error.what(), base::wrong_usage);
+  } catch (const device::AddressError& error) {
+    return report_error(context, error.what(), base::wrong_usage);
   } catch (const simulation::SceneError& error) {
-    return report_error(context, error.what(), wrong_usage);
+    return report_error(context, error.what(), base::wrong_usage);
   } catch (const plot::CsvError& error) {
-    return report_error(context, error.what(), wrong_usage);
+    return report_error(context, error.what(), base::wrong_usage);
   } catch (const plot::PictureNameError& error) {
-    return report_error(context, error.what(), wrong_usage);
+    return report_error(context, error.what(), base::wrong_usage);
   } catch (const std::exception& error) {
-    return report_error(context, error.what(), failed);
+    return report_error(context, error.what(), base::failed);
   }
 }
 
@@ -125,7 +125,7 @@ void declare(CLI::App& app, Context& context) {
   add_device_option(app, context);
   app.require_subcommand(1);
   app.footer(std::string("'kmax COMMAND --help' explains a command and shows examples.\n\n") +
-             exit_code_text);
+             base::exit_code_text);
   add_all_commands(app, context);
 }
 
@@ -139,10 +139,10 @@ std::optional<int> parse(CLI::App& app, const std::vector<std::string>& argument
     app.parse(reversed);
   } catch (const CLI::Success& request) {  // --help, --version
     app.exit(request, context.out, context.out);
-    return done;
+    return base::done;
   } catch (const CLI::ParseError& error) {
     context.json = wants_json;
-    return report_error(context, usage_message(app, error, arguments), wrong_usage);
+    return report_error(context, usage_message(app, error, arguments), base::wrong_usage);
   }
   return std::nullopt;
 }
@@ -154,14 +154,14 @@ int run(const std::vector<std::string>& arguments, Context& context) {
     const auto first = arguments.begin() + (arguments.size() > 1 && arguments[1] == "--" ? 2 : 1);
     for (const std::string& candidate : completions(app, {first, arguments.end()}))
       context.out << candidate << '\n';
-    return done;
+    return base::done;
   }
   const std::optional<int> ended = parse(app, arguments, context);
   return ended ? *ended : act(context);
 }
 
 std::optional<std::string> Context::named_device() const {
-  return device_option.empty() ? link::default_device_address() : device_option;
+  return device_option.empty() ? device::default_device_address() : device_option;
 }
 
 std::vector<std::size_t> Context::axes() const {
@@ -171,12 +171,12 @@ std::vector<std::size_t> Context::axes() const {
   return all;
 }
 
-std::unique_ptr<link::Link> Context::open_link() {
+std::unique_ptr<device::Link> Context::open_link() {
   return opener_(device_address(), [this](const std::string& text) { note(text); });
 }
 
 device::Device Context::connect() {
-  const link::Notice notice = [this](const std::string& text) { note(text); };
+  const device::Notice notice = [this](const std::string& text) { note(text); };
   auto opened = open_link();
   if (!named_device())
     note(
@@ -192,24 +192,25 @@ device::Device Context::connect_to_change() {
         "set KMAX_DEVICE, or write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be "
         "reached. 'kmax serve --serial /tmp/kmax' is a simulated one that lasts, --device sim one that is "
         "gone when the command ends",
-        link::settings_file().string()));
+        device::settings_file().string()));
   return connect();
 }
 
 std::size_t Context::width() const {
   if (fixed_width) return *fixed_width;
-  const auto terminal = terminal_behind(out);
+  const auto terminal = base::terminal_behind(out);
   return terminal ? std::max<std::size_t>(terminal->columns, 40) : 0;
 }
 
 void Context::say(const std::string& text, std::size_t indent) {
-  out << (width() == 0 ? text : wrapped(text, columns() - indent, indent)) << '\n';
+  out << (width() == 0 ? text : base::wrapped(text, columns() - indent, indent)) << '\n';
 }
 
 void Context::note(const std::string& text) {
-  Progress::make_room_on_terminal();
-  const auto terminal = terminal_behind(messages_);
-  messages_ << (terminal ? wrapped("kmax: " + text, terminal->columns - 3, 2) : "kmax: " + text) << std::endl;
+  base::Progress::make_room_on_terminal();
+  const auto terminal = base::terminal_behind(messages_);
+  messages_ << (terminal ? base::wrapped("kmax: " + text, terminal->columns - 3, 2) : "kmax: " + text)
+            << std::endl;
 }
 
 }  // namespace kmax::cli

@@ -97,7 +97,7 @@ CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, 
   if (takes == Takes::axis || takes == Takes::device_and_axis)
     add_axis_option(*command, context, "Axis that names without a prefix are on");
   const std::string examples = *text.examples == '\0' ? "" : fmt::format("Examples:\n{}\n\n", text.examples);
-  command->footer(examples + exit_code_text);
+  command->footer(examples + base::exit_code_text);
   return command;
 }
 

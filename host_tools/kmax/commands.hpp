@@ -26,8 +26,8 @@ namespace kmax::cli {
 //   }
 //
 // Options that declare one of the context's own, such as --axis, take it as declare()'s second argument.
-// run_x() returns an ExitCode and reports errors by throwing: UsageError, device::ValueError and
-// link::AddressError become exit code 2, every other exception 1; the message is shown, with --json as
+// run_x() returns an ExitCode and reports errors by throwing: UsageError, base::ValueError and
+// device::AddressError become exit code 2, every other exception 1; the message is shown, with --json as
 // {"error": "..."}.
 
 /// All of them, in groups and in the order the help shows.

@@ -219,7 +219,7 @@ int run_completion(Context& context, const CompletionOptions& options) {
   } else {
     context.out << script;
   }
-  return done;
+  return base::done;
 }
 
 void write_pages(const CLI::App& app, const std::filesystem::path& folder, Words& written) {
@@ -251,9 +251,9 @@ void add_completion_commands(CLI::App& app, Context& context) {
       if (context.json) {
         context.print({{"pages", written}});
       } else {
-        print(context.out, "{} pages in {}\n", written.size(), *folder);
+        base::print(context.out, "{} pages in {}\n", written.size(), *folder);
       }
-      return static_cast<int>(done);
+      return static_cast<int>(base::done);
     };
   });
 }

@@ -31,7 +31,8 @@ class UsageError : public std::invalid_argument {
 /// user on the way goes to note().
 class Context {
  public:
-  using Opener = std::function<std::unique_ptr<link::Link>(const std::string& address, const link::Notice&)>;
+  using Opener =
+      std::function<std::unique_ptr<device::Link>(const std::string& address, const device::Notice&)>;
 
   Context(std::ostream& out_stream, std::ostream& messages, Opener opener)
       : out(out_stream), messages_(messages), opener_(std::move(opener)) {}
@@ -43,7 +44,7 @@ class Context {
   /// for that command only and keeps nothing of it.
   device::Device connect_to_change();
   /// The link alone.
-  std::unique_ptr<link::Link> open_link();
+  std::unique_ptr<device::Link> open_link();
 
   /// One line on the messages' stream.
   void note(const std::string& text);
@@ -84,8 +85,8 @@ class Context {
   std::string device_option;
   std::optional<std::size_t> axis_option;
   /// How a CAN bus is reached, besides the link to one device on it.
-  std::function<std::unique_ptr<link::CanPort>(const std::string& bus, const link::CanPortOptions&)>
-      open_bus = link::open_can_port;
+  std::function<std::unique_ptr<device::CanPort>(const std::string& bus, const device::CanPortOptions&)>
+      open_bus = device::open_can_port;
   /// How the board is reached besides its links (board_services.hpp); null: as this computer does.
   std::shared_ptr<const BoardServices> board_services;
   std::function<int()> action;  ///< what the chosen command does; returns an exit code

@@ -79,7 +79,7 @@ void add_row(std::string& text, const std::string& term, const std::string& mean
   const bool alone = term.size() + 2 > term_width;
   text += fmt::format("{:{}}{:<{}}{}", "", term_indent, term, alone ? 0 : term_width,
                       alone ? "\n" + std::string(column, ' ') : "");
-  text += wrapped(meaning, width - column, column) + "\n";
+  text += base::wrapped(meaning, width - column, column) + "\n";
 }
 
 void add_options(std::string& text, const CLI::App& app, bool positional, const std::string& title,
@@ -98,10 +98,10 @@ void add_options(std::string& text, const CLI::App& app, bool positional, const 
 std::string footer_text(const std::string& footer, std::size_t width) {
   std::string text, paragraph;
   const auto end_paragraph = [&] {
-    if (!paragraph.empty()) text += wrapped(paragraph, width, 0) + "\n";
+    if (!paragraph.empty()) text += base::wrapped(paragraph, width, 0) + "\n";
     paragraph.clear();
   };
-  for (const std::string& line : lines_of(footer, std::string::npos)) {
+  for (const std::string& line : base::lines_of(footer, std::string::npos)) {
     const std::size_t indent = std::min(line.find_first_not_of(' '), line.size());
     if (indent == 0 && !line.empty()) {
       paragraph += (paragraph.empty() ? "" : " ") + line;
@@ -109,8 +109,9 @@ std::string footer_text(const std::string& footer, std::size_t width) {
     }
     end_paragraph();
     const std::string words = std::regex_replace(line.substr(indent), std::regex(" {2,}"), "  ");
-    text +=
-        line.size() <= width ? line : line.substr(0, indent) + wrapped(words, width - indent - 2, indent + 2);
+    text += line.size() <= width
+                ? line
+                : line.substr(0, indent) + base::wrapped(words, width - indent - 2, indent + 2);
     text += '\n';
   }
   end_paragraph();
@@ -202,8 +203,8 @@ OptionText text_of(const CLI::Option& option) {
 
 std::string help_text(const CLI::App& app, std::size_t width) {
   width = std::max<std::size_t>(width, 40);
-  std::string text = wrapped(app.get_description(), width, 0) + "\n\n";
-  text += "Usage: " + wrapped(usage(app), width - 9, 9) + "\n";
+  std::string text = base::wrapped(app.get_description(), width, 0) + "\n\n";
+  text += "Usage: " + base::wrapped(usage(app), width - 9, 9) + "\n";
   add_options(text, app, true, "Arguments", width);
   for (const auto& [group, commands] : commands_by_group(app)) {
     text += fmt::format("\n{}:\n", group);

@@ -4,8 +4,8 @@
 #include "host_tools/kmax/commands.hpp"
 
 int main(int argc, char** argv) {
-  const auto open = [](const std::string& address, const kmax::link::Notice& notice) {
-    return kmax::link::open_link(kmax::link::parse_device_address(address), notice);
+  const auto open = [](const std::string& address, const kmax::device::Notice& notice) {
+    return kmax::device::open_link(kmax::device::parse_device_address(address), notice);
   };
   kmax::cli::Context context(std::cout, std::cerr, open);
   return kmax::cli::run({argv + 1, argv + argc}, context);

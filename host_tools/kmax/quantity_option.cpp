@@ -15,15 +15,15 @@ using CLI::Validator;
 
 Validator quantity(const char* unit, double least, double most) {
   const std::string allowed =
-      device::in_unit(fmt::format("{} .. {}", device::number_text(least), device::number_text(most)), unit);
+      base::in_unit(fmt::format("{} .. {}", base::number_text(least), base::number_text(most)), unit);
   const auto convert = [unit = std::string(unit), least, most, allowed](std::string& text) -> std::string {
     try {
-      const device::WrittenNumber number = device::written_number(text, unit, "a number", allowed);
+      const base::WrittenNumber number = base::written_number(text, unit, "a number", allowed);
       if (number.value < least || number.value > most)
         return fmt::format("{} not in range {}", number.as_given, allowed);
       text = fmt::format("{}", number.value);
       return {};
-    } catch (const device::ValueError& error) {
+    } catch (const base::ValueError& error) {
       return error.what();
     }
   };

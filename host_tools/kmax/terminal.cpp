@@ -83,7 +83,7 @@ bool input_is_terminal() {
 }
 
 std::string hidden_line(Context& context, const std::string& prompt) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   const bool typed = input_is_terminal();
   if (typed) context.messages() << "kmax: " << prompt << ": " << std::flush;
   // The end of the line, which did not show.

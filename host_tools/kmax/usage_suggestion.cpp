@@ -72,7 +72,7 @@ std::string choice_suggestion(std::string_view message) {
     choices.emplace_back(one.substr(0, one.find("->")));  // of a choice that is translated
     at = comma + 1;
   }
-  return device::did_you_mean(value, choices);
+  return base::did_you_mean(value, choices);
 }
 }  // namespace
 
@@ -100,7 +100,7 @@ std::string usage_suggestion(const App& app, const CLI::ParseError& error,
   const std::vector<std::string> known = options_of(*command_in(app, arguments));
   for (const std::string& argument : arguments) {
     const std::string name = option_name(argument);
-    if (is_long_option(argument) && !contains(known, name)) return device::did_you_mean(name, known);
+    if (is_long_option(argument) && !contains(known, name)) return base::did_you_mean(name, known);
   }
   return {};
 }

@@ -23,14 +23,14 @@ using library::Session;
 using library::translated;
 
 namespace {
-link::DeviceAddress address_of(const std::string& text) {
-  if (!text.empty()) return link::parse_device_address(text);
-  const auto named = link::default_device_address();
+device::DeviceAddress address_of(const std::string& text) {
+  if (!text.empty()) return device::parse_device_address(text);
+  const auto named = device::default_device_address();
   if (!named)
-    throw device::ValueError(
+    throw base::ValueError(
         "no device is named: give its address, usb, serial:PATH, can:IFACE or sim, or set KMAX_DEVICE; 'kmax "
         "devices' shows what can be reached");
-  return link::parse_device_address(*named);
+  return device::parse_device_address(*named);
 }
 
 Value value_of(const device::Parameter& parameter, std::uint32_t raw) {
@@ -38,7 +38,7 @@ Value value_of(const device::Parameter& parameter, std::uint32_t raw) {
   Value value{.number = firmware::number_from_raw(entry.type, raw),
               .unit = std::string(entry.unit),
               .whole = entry.type != firmware::Type::float32};
-  if (!value.whole) value.number = device::shortest_double(std::bit_cast<float>(raw));
+  if (!value.whole) value.number = base::shortest_double(std::bit_cast<float>(raw));
   if (!entry.values.empty()) value.choice = device::value_text(parameter, raw);
   return value;
 }
@@ -48,7 +48,7 @@ std::vector<std::string> assignment_texts(const std::vector<std::pair<std::strin
   std::vector<std::string> texts;
   for (const auto& [name, value] : values) {
     if (name.find('=') != std::string::npos)
-      throw device::ValueError(fmt::format("'{}' is no parameter's name", name));
+      throw base::ValueError(fmt::format("'{}' is no parameter's name", name));
     texts.push_back(fmt::format("{}={}", name, value));
   }
   return texts;
@@ -98,7 +98,7 @@ bool Device::is_open() const {
 
 std::string Device::address() const {
   const library::OpenDevice::Call call(open_.get());
-  return link::text_of(call.session().address);
+  return device::text_of(call.session().address);
 }
 
 std::vector<Value> Device::get(const std::vector<std::string>& names) {
@@ -173,7 +173,7 @@ void Device::wait(double seconds) {
   Session& session = call.session();
   translated([&] {
     if (!(seconds >= 0) || !std::isfinite(seconds))
-      throw device::ValueError(fmt::format("{} s cannot be waited; it is a number from 0 on", seconds));
+      throw base::ValueError(fmt::format("{} s cannot be waited; it is a number from 0 on", seconds));
     library::wait(session, seconds);
   });
 }
@@ -201,8 +201,8 @@ CommandResult Device::command(const std::vector<std::string>& arguments) {
   const library::OpenDevice::Call call(open_.get());
   Session& session = call.session();
   return translated([&] {
-    return library::run_command_on(arguments, link::text_of(session.address), [&session] {
-      return std::make_unique<link::ForwardingLink>(session.link());
+    return library::run_command_on(arguments, device::text_of(session.address), [&session] {
+      return std::make_unique<device::ForwardingLink>(session.link());
     });
   });
 }

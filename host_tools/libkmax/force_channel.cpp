@@ -48,7 +48,7 @@ class LoopPdos {
     require_no_other_sync();
     const bool left = are_left(device_);
     if (!left && (device_.read(rpdo_count) != 0 || device_.read(rpdo_cob_id) != rpdo_cob_id.default_raw()))
-      throw device::DeviceError(
+      throw base::DeviceError(
           "RPDO 3 is set up for something else, and a force loop needs it: put 0 into 0x1602:0, or reset the "
           "node's communication (NMT 130)");
     if (left) put_back();
@@ -91,12 +91,12 @@ class LoopPdos {
     constexpr std::uint32_t makes_sync = 1U << 30;
     const std::uint32_t sync = device_.read(Parameter::of<"canopen.sync_cob_id">());
     if ((sync & makes_sync) != 0)
-      throw device::DeviceError(
+      throw base::DeviceError(
           "the device makes SYNC itself, and a force loop needs to: clear bit 30 of 0x1005");
     if ((sync & cob_id::identifier) != cob_id::sync)
-      throw device::DeviceError(fmt::format("0x1005 is 0x{:X}; a force loop needs SYNC at 0x80", sync));
+      throw base::DeviceError(fmt::format("0x1005 is 0x{:X}; a force loop needs SYNC at 0x80", sync));
     if (device_.read(Parameter::of<"canopen.sync_counter_overflow">()) != 0)
-      throw device::DeviceError("SYNC has a counter (0x1019); a force loop needs it to be 0");
+      throw base::DeviceError("SYNC has a counter (0x1019); a force loop needs it to be 0");
   }
 
   void put_back() {
@@ -120,7 +120,7 @@ class PdoChannel final : public ForceChannel {
       : axis_(axis),
         pdos_(session),
         plan_(record::read_pdo_plan(session.device, session.address.node)),
-        port_(link::open_can_port(session.address.path, options_of(plan_))),
+        port_(device::open_can_port(session.address.path, options_of(plan_))),
         rows_(plan_without_period(plan_)),
         bit_rate_(session.device.read(Parameter::of<"can.bit_rate_in_use">())) {
     pdos_.set_up(axis);
@@ -172,8 +172,8 @@ class PdoChannel final : public ForceChannel {
   }
 
  private:
-  static link::CanPortOptions options_of(const record::PdoPlan& plan) {
-    link::CanPortOptions options;
+  static device::CanPortOptions options_of(const record::PdoPlan& plan) {
+    device::CanPortOptions options;
     for (const std::uint32_t identifier : plan.identifiers) options.filters.push_back({identifier});
     return options;
   }
@@ -190,7 +190,7 @@ class PdoChannel final : public ForceChannel {
   std::size_t axis_;
   LoopPdos pdos_;
   record::PdoPlan plan_;
-  std::unique_ptr<link::CanPort> port_;
+  std::unique_ptr<device::CanPort> port_;
   record::PdoRows rows_;
   std::uint32_t bit_rate_;
   double round_trip_ = 0;

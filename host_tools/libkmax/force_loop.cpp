@@ -14,7 +14,7 @@
 
 namespace kmax::library {
 
-using device::DeviceError;
+using base::DeviceError;
 using device::Drive;
 using device::Parameter;
 using std::chrono::microseconds;
@@ -198,12 +198,12 @@ class Loop {
           options_.watchdog));
     if (!force) return false;
     if (!std::isfinite(*force))
-      throw device::ValueError(
+      throw base::ValueError(
           fmt::format("the loop's function gave {}; a force is a finite number of N", *force));
     const Parameter target = Parameter::of<"profile.target_force">(options_.axis);
     const double most = target.definition().maximum;
     if (std::abs(*force) > most)
-      throw device::ValueError(
+      throw base::ValueError(
           fmt::format("the loop's function gave {} N; a force is from {} to {} N", *force, -most, most));
     channel_.send(static_cast<float>(*force));
     keep({.time = sample.time,
@@ -238,11 +238,11 @@ class Loop {
     if (unanswered_ > microseconds(static_cast<std::int64_t>(options_.watchdog * 1e6))) channel_.send(0.0F);
     if (unanswered_ < milliseconds(1000)) return;
     const device::DriveStatus status = Drive(session_.device, options_.axis).status();
-    throw link::LinkError(
+    throw device::LinkError(
         fmt::format("{}: no complete answer to SYNC for 1 s while axis {} is in '{}': is the bus too busy, "
                     "or was the node "
                     "taken out of the state operational?",
-                    link::text_of(session_.address), options_.axis, device::to_string(status.state())));
+                    device::text_of(session_.address), options_.axis, device::to_string(status.state())));
   }
 
   Session& session_;
@@ -260,7 +260,7 @@ double checked_rate(const ForceLoopOptions& options, const ForceChannel& channel
   const double highest = channel.highest_rate();
   const double rate = options.rate.value_or(highest);
   if (!(rate >= 1 && rate <= highest))
-    throw device::ValueError(fmt::format(
+    throw base::ValueError(fmt::format(
         "a force loop at {} Hz is not possible over this link; allowed are 1 to {:.0f} Hz", rate, highest));
   return rate;
 }
@@ -270,10 +270,10 @@ ForceRecord run_force_loop(Session& session, const ForceLoopOptions& options,
                            const Device::ForceFunction& function) {
   session.require_axis(options.axis);
   if (!(options.watchdog > 0) || !(options.watchdog <= 10))
-    throw device::ValueError(fmt::format(
+    throw base::ValueError(fmt::format(
         "a watchdog of {} s is not possible; allowed is more than 0 and up to 10 s", options.watchdog));
   if (options.seconds && !(*options.seconds > 0))
-    throw device::ValueError(fmt::format("{} is not a number of seconds above 0", *options.seconds));
+    throw base::ValueError(fmt::format("{} is not a number of seconds above 0", *options.seconds));
   const Sequence::Hold hold(session.run, session.link());
   const double timeout = session.link_timeout();
   if (timeout == 0)

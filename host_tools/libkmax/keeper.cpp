@@ -50,7 +50,7 @@ void Keeper::run(const std::stop_token& stop) {
   }
 }
 
-/// Reading is a sign of life too: link::Link's implementations see to that.
+/// Reading is a sign of life too: device::Link's implementations see to that.
 void Keeper::look() {
   const device::DriveStatus status = device::Drive(device_, axis_).status();
   if (status.armed()) return;

@@ -15,7 +15,7 @@ class OpenDevice {
  public:
   class Call;
 
-  OpenDevice(const link::DeviceAddress& address, DeviceOptions options)
+  OpenDevice(const device::DeviceAddress& address, DeviceOptions options)
       : session_(std::make_unique<Session>(address, std::move(options))), process_(session_->process) {}
 
   /// Ends the calls of other threads, which throw Error, and waits for them. Again does nothing; in a fork's

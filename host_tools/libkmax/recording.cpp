@@ -65,7 +65,7 @@ void take_rows(SharedLink& link, record::RowSource& source, double seconds, std:
 }
 
 /// The session's link, while nobody else sets anything.
-class SettingLink final : public link::ForwardingLink {
+class SettingLink final : public device::ForwardingLink {
  public:
   explicit SettingLink(Session& session)
       : ForwardingLink(session.link()), hold_(session.settings, session.link()) {}
@@ -81,9 +81,9 @@ Recording record_pdos(Session& session, double seconds, std::size_t axis,
       [&session] { return device::Device(std::make_unique<SettingLink>(session)); }, session.options.notice);
   telemetry.ask();
   const record::PdoPlan plan = record::read_pdo_plan(session.device, session.address.node);
-  const auto port = link::open_can_port(session.address.path, record::port_options(plan));
+  const auto port = device::open_can_port(session.address.path, record::port_options(plan));
   record::CanSource source(*port, plan, [&telemetry] { telemetry.ask(); });
-  Recording recording{.source = fmt::format("{}, a PDO set every {:g} ms", link::text_of(session.address),
+  Recording recording{.source = fmt::format("{}, a PDO set every {:g} ms", device::text_of(session.address),
                                             1000.0 * plan.period_ticks / firmware::tick_rate_hz)};
   take_rows(session.link(), source, seconds, axis, more, recording);
   return recording;
@@ -101,11 +101,11 @@ void wait(Session& session, double seconds) {
 Recording record(Session& session, double seconds, std::size_t axis,
                  const std::function<bool(const std::vector<Sample>&)>& more) {
   session.require_axis(axis);
-  if (!(seconds > 0)) throw device::ValueError(fmt::format("{} is not a number of seconds above 0", seconds));
+  if (!(seconds > 0)) throw base::ValueError(fmt::format("{} is not a number of seconds above 0", seconds));
   const Sequence::Hold hold(session.run, session.link());
   if (session.is_can()) return record_pdos(session, seconds, axis, more);
   record::PolledSource source(session.device, {axis});
-  Recording recording{.source = fmt::format("{}, as fast as it answers", link::text_of(session.address))};
+  Recording recording{.source = fmt::format("{}, as fast as it answers", device::text_of(session.address))};
   take_rows(session.link(), source, seconds, axis, more, recording);
   return recording;
 }
@@ -113,7 +113,7 @@ Recording record(Session& session, double seconds, std::size_t axis,
 Capture capture(Session& session, const CaptureRequest& request, const std::function<void()>& armed) {
   session.require_axis(request.axis);
   if (!(request.patience >= 0))
-    throw device::ValueError(fmt::format("{} s is no time to wait for a trigger", request.patience));
+    throw base::ValueError(fmt::format("{} s is no time to wait for a trigger", request.patience));
   const Sequence::Hold hold(session.run, session.link());
   device::CaptureReader reader(session.device);
   {

@@ -6,7 +6,7 @@ namespace kmax::library {
 
 Sequence::Hold::Hold(Sequence& sequence, const SharedLink& link) : sequence_(sequence) {
   if (sequence_.owner_ == std::this_thread::get_id())
-    throw device::DeviceError(
+    throw base::DeviceError(
         "this was called from within another call to the device, by the function or the signal handler that "
         "it runs, and the two do not go together: let that one end first (set(), get() and status() may be "
         "called in the function of a force loop or a recording)");

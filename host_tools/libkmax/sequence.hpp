@@ -22,7 +22,7 @@ class Sequence {
 class Sequence::Hold {
  public:
   /// Waits for another thread's, and meanwhile asks SharedLink::poll() whether to. Errors: what that throws;
-  /// device::DeviceError if it is this thread's already, which would wait for itself.
+  /// base::DeviceError if it is this thread's already, which would wait for itself.
   Hold(Sequence& sequence, const SharedLink& link);
   ~Hold();
   Hold(const Hold&) = delete;

@@ -14,9 +14,9 @@
 namespace kmax::library {
 
 namespace {
-std::unique_ptr<SharedLink> open_shared(const link::DeviceAddress& address, const DeviceOptions& options) {
-  return std::make_unique<SharedLink>(link::open_link(address, options.notice),
-                                      address.kind == link::DeviceAddress::Kind::sim, options.poll);
+std::unique_ptr<SharedLink> open_shared(const device::DeviceAddress& address, const DeviceOptions& options) {
+  return std::make_unique<SharedLink>(device::open_link(address, options.notice),
+                                      address.kind == device::DeviceAddress::Kind::sim, options.poll);
 }
 
 DeviceOptions with_notice(DeviceOptions options) {
@@ -26,7 +26,7 @@ DeviceOptions with_notice(DeviceOptions options) {
 }
 }  // namespace
 
-Session::Session(const link::DeviceAddress& where, DeviceOptions wanted)
+Session::Session(const device::DeviceAddress& where, DeviceOptions wanted)
     : address(where),
       options(with_notice(std::move(wanted))),
       process(getpid()),
@@ -58,7 +58,7 @@ std::string Session::disarm_failure(std::size_t axis, std::string_view why) cons
 
 void Session::require_axis(std::size_t axis) const {
   if (axis >= firmware::axis_count)
-    throw device::ValueError(
+    throw base::ValueError(
         fmt::format("there is no axis {}; axes are 0 to {}", axis, firmware::axis_count - 1));
 }
 
@@ -137,12 +137,12 @@ void Session::require_armed_ones() {
       // Its own thread reads the state already.
       if (axes_[axis].keeper) {
         if (const std::string trouble = axes_[axis].keeper->trouble(); !trouble.empty())
-          throw device::DeviceError(trouble);
+          throw base::DeviceError(trouble);
         continue;
       }
     }
     const device::DriveStatus status = device::Drive(device, axis).status();
-    if (!status.armed()) throw device::DeviceError(force_is_off(axis, status));
+    if (!status.armed()) throw base::DeviceError(force_is_off(axis, status));
   }
 }
 

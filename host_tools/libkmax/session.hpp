@@ -23,12 +23,12 @@ namespace kmax::library {
 /// What an open device consists of.
 class Session {
  public:
-  Session(const link::DeviceAddress& address, DeviceOptions options);
+  Session(const device::DeviceAddress& address, DeviceOptions options);
   /// Disarms what it armed.
   ~Session();
 
   void require_axis(std::size_t axis) const;
-  bool is_can() const { return address.kind == link::DeviceAddress::Kind::can; }
+  bool is_can() const { return address.kind == device::DeviceAddress::Kind::can; }
   double link_timeout() { return device.read_number("link.timeout"); }
 
   void arm(std::size_t axis, bool keep_alive);
@@ -38,7 +38,7 @@ class Session {
   /// RefusedError, or LinkError, if an axis that was armed here has lost its force.
   void require_armed_ones();
 
-  const link::DeviceAddress address;
+  const device::DeviceAddress address;
   const DeviceOptions options;
   const pid_t process;
 

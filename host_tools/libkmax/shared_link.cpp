@@ -10,7 +10,7 @@ using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
 namespace {
-/// Long enough for a program that tries to get in every 2 ms (link::ExclusiveUse), short enough to hear of
+/// Long enough for a program that tries to get in every 2 ms (device::ExclusiveUse), short enough to hear of
 /// Ctrl-C.
 constexpr milliseconds slice{20}, lent{10}, idle{30};
 }  // namespace
@@ -32,12 +32,12 @@ class SharedLink::Turn {
   const SharedLink& link_;
 };
 
-SharedLink::SharedLink(std::unique_ptr<link::Link> inner, bool virtual_time, std::function<void()> poll)
+SharedLink::SharedLink(std::unique_ptr<device::Link> inner, bool virtual_time, std::function<void()> poll)
     : inner_(std::move(inner)), virtual_time_(virtual_time), poll_(std::move(poll)) {}
 
 void SharedLink::enter() const {
   std::unique_lock lock(mutex_);
-  // Who writes may be asked about the time meanwhile (link::Link::write).
+  // Who writes may be asked about the time meanwhile (device::Link::write).
   if (depth_ > 0 && owner_ == std::this_thread::get_id()) {
     ++depth_;
     return;
@@ -58,7 +58,7 @@ void SharedLink::leave() const {
 }
 
 void SharedLink::lend_if_due() {
-  using link::PeriodicYield;
+  using device::PeriodicYield;
   if (lending_ && !virtual_time_ && !Uninterrupted::here() && Clock::now() - lent_ >= PeriodicYield::own_time)
     lend(PeriodicYield::others_time);
   last_used_ = Clock::now().time_since_epoch().count();
@@ -76,7 +76,7 @@ std::vector<std::uint32_t> SharedLink::read(std::span<const std::size_t> slots) 
   return inner_->read(slots);
 }
 
-void SharedLink::write(std::span<const link::SlotValue> values, link::Repeat repeat,
+void SharedLink::write(std::span<const device::SlotValue> values, device::Repeat repeat,
                        const std::function<void()>& before_request) {
   const Turn turn(*this);
   inner_->write(values, repeat, before_request);

@@ -30,16 +30,16 @@ class Uninterrupted {
 /// One link for many threads: each request is whole, and who waits longest is next.
 ///
 /// A link is lent to other programs in wait(), in lend_if_idle(), and, unless that is switched off, between
-/// the requests of one that reads without a pause (as link::PeriodicYield does): one that stops the device
+/// the requests of one that reads without a pause (as device::PeriodicYield does): one that stops the device
 /// must not be kept out, whoever has armed it.
-class SharedLink final : public link::Link {
+class SharedLink final : public device::Link {
  public:
   /// `poll` is called at least every 20 ms while a thread waits, unless it is Uninterrupted; what it throws
   /// ends the waiting. `virtual_time`: time passes in the link's own calls only.
-  SharedLink(std::unique_ptr<link::Link> inner, bool virtual_time, std::function<void()> poll);
+  SharedLink(std::unique_ptr<device::Link> inner, bool virtual_time, std::function<void()> poll);
 
   std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
-  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+  void write(std::span<const device::SlotValue> values, device::Repeat repeat,
              const std::function<void()>& before_request) override;
   std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
@@ -57,10 +57,10 @@ class SharedLink final : public link::Link {
   void set_lending(bool lending) { lending_ = lending; }
   /// For a thread beside those that use the link: lends it for 10 ms if nobody has used it for 30 ms.
   /// `sign_of_life` is called before, with the link this thread's: whoever gets it may keep it for
-  /// link::PeriodicYield::own_time.
+  /// device::PeriodicYield::own_time.
   void lend_if_idle(const std::function<void()>& sign_of_life);
   bool virtual_time() const { return virtual_time_; }
-  link::Link& inner() { return *inner_; }
+  device::Link& inner() { return *inner_; }
 
  private:
   class Turn;
@@ -72,7 +72,7 @@ class SharedLink final : public link::Link {
   void lend_if_due();
   void lend(std::chrono::microseconds duration);
 
-  std::unique_ptr<link::Link> inner_;
+  std::unique_ptr<device::Link> inner_;
   bool virtual_time_;
   std::function<void()> poll_;
   Clock::time_point lent_ = Clock::now();  ///< the end of the last loan; with a turn

@@ -11,19 +11,19 @@ namespace kmax::library {
 void rethrow_translated() {
   try {
     throw;
-  } catch (const device::ValueError& error) {
+  } catch (const base::ValueError& error) {
     throw ValueError(error.what());
-  } catch (const link::AddressError& error) {
+  } catch (const device::AddressError& error) {
     throw ValueError(error.what());
   } catch (const cli::UsageError& error) {
     throw ValueError(error.what());
   } catch (const simulation::SceneError& error) {
     throw ValueError(error.what());
-  } catch (const link::LinkError& error) {
+  } catch (const device::LinkError& error) {
     throw LinkError(error.what());
-  } catch (const link::RefusedError& error) {
+  } catch (const device::RefusedError& error) {
     throw RefusedError(error.what());
-  } catch (const device::DeviceError& error) {
+  } catch (const base::DeviceError& error) {
     throw RefusedError(error.what());
   }
 }

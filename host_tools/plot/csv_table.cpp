@@ -21,7 +21,7 @@ std::vector<std::string_view> fields_of(std::string_view line) {
   std::vector<std::string_view> fields;
   for (;;) {
     const std::size_t comma = line.find(',');
-    fields.push_back(device::trimmed(line.substr(0, comma)));
+    fields.push_back(base::trimmed(line.substr(0, comma)));
     if (comma == std::string_view::npos) return fields;
     line.remove_prefix(comma + 1);
   }
@@ -70,7 +70,7 @@ CsvTable read_csv(const std::filesystem::path& path, const CsvDemand& demand) {
     std::string_view line = rest.substr(0, end);
     rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
     if (line.ends_with('\r')) line.remove_suffix(1);
-    line = device::trimmed(line);
+    line = base::trimmed(line);
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string_view> fields = fields_of(line);
     if (table.names.empty()) {

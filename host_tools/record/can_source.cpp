@@ -18,14 +18,14 @@ constexpr std::uint8_t start_node = 1, enter_pre_operational = 128;
 constexpr std::uint8_t stopped = 4, operational = 5;
 }  // namespace
 
-link::CanPortOptions port_options(const PdoPlan& plan) {
-  link::CanPortOptions options;
+device::CanPortOptions port_options(const PdoPlan& plan) {
+  device::CanPortOptions options;
   for (const std::uint32_t identifier : plan.identifiers) options.filters.push_back({identifier});
   options.filters.push_back({cob_id::heartbeat + plan.node});
   return options;
 }
 
-CanSource::CanSource(link::CanPort& port, const PdoPlan& plan, std::function<void()> ask_again)
+CanSource::CanSource(device::CanPort& port, const PdoPlan& plan, std::function<void()> ask_again)
     : port_(port), plan_(plan), ask_again_(std::move(ask_again)), rows_(plan) {
   if (plan.node_state == operational) return;
   start();
@@ -90,8 +90,8 @@ void CanSource::hear_state(std::uint8_t state) {
   stopped_ = state == stopped;
   if (state != 0) return;
   started_ = false;
-  throw device::DeviceError(fmt::format("{}: node {} has restarted, so that its ticks began again",
-                                        port_.description(), plan_.node));
+  throw base::DeviceError(fmt::format("{}: node {} has restarted, so that its ticks began again",
+                                      port_.description(), plan_.node));
 }
 
 void CanSource::start() {
@@ -114,7 +114,7 @@ void CanSource::fail_silent() const {
   const std::string trouble = port_.trouble();
   const std::string malformed =
       rows_.malformed() == 0 ? "" : fmt::format("; {} PDOs had the wrong length", rows_.malformed());
-  throw link::LinkError(
+  throw device::LinkError(
       fmt::format("{}: no complete set of PDOs from node {} for {} s{}; {}", port_.description(), plan_.node,
                   std::chrono::duration_cast<std::chrono::seconds>(patience).count(), malformed,
                   trouble.empty() ? "was it stopped by another NMT master, unplugged, or is the bus too busy?"

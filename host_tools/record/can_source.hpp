@@ -12,7 +12,7 @@
 namespace kmax::record {
 
 /// What a port must let pass for a CanSource.
-link::CanPortOptions port_options(const PdoPlan& plan);
+device::CanPortOptions port_options(const PdoPlan& plan);
 
 /// Rows from the TPDOs that a CANopen device sends by itself, as often as its event times say.
 ///
@@ -33,7 +33,7 @@ class CanSource final : public RowSource {
 
   /// `port` must outlive this. `plan` is fresh: at most a second old. Nobody need talk to the device by SDO
   /// meanwhile, so others may; `ask_again` does, and may say by an exception that the recording has to end.
-  CanSource(link::CanPort& port, const PdoPlan& plan, std::function<void()> ask_again = {});
+  CanSource(device::CanPort& port, const PdoPlan& plan, std::function<void()> ask_again = {});
   ~CanSource() override;
 
   std::optional<Row> next(std::chrono::microseconds wait) override;
@@ -50,7 +50,7 @@ class CanSource final : public RowSource {
   void start_again();
   [[noreturn]] void fail_silent() const;
 
-  link::CanPort& port_;
+  device::CanPort& port_;
   PdoPlan plan_;
   bool started_ = false;
   std::function<void()> ask_again_;

@@ -12,7 +12,7 @@
 
 namespace kmax::record {
 
-using device::DeviceError;
+using base::DeviceError;
 using device::Parameter;
 namespace cob_id = firmware::canopen::cob_id;
 

@@ -25,8 +25,8 @@ struct PdoPlan {
 };
 
 /// Reads from the device how its first four TPDOs are set up. They must have the factory's mapping and be
-/// sent together by one event time; identifiers and event time may be others. Errors: device::DeviceError
-/// with the first setting that does not fit and how to get the factory's back, link::LinkError.
+/// sent together by one event time; identifiers and event time may be others. Errors: base::DeviceError
+/// with the first setting that does not fit and how to get the factory's back, device::LinkError.
 PdoPlan read_pdo_plan(device::Device& device, std::uint8_t node);
 
 }  // namespace kmax::record

@@ -35,7 +35,7 @@ std::optional<Row> PolledSource::next(std::chrono::microseconds /*wait*/) {
 std::uint64_t PolledSource::unwrapped(std::uint32_t tick, std::uint64_t reference) const {
   const std::uint32_t past = tick - static_cast<std::uint32_t>(reference);
   if (past > 0x80000000U)
-    throw device::DeviceError(
+    throw base::DeviceError(
         fmt::format("{}: the device has restarted, so that its ticks began again", device_.description()));
   return reference + past;
 }

@@ -10,7 +10,7 @@
 namespace kmax::record {
 
 /// Rows read over any link as fast as it goes: one request for each axis. Now and then the link is lent to
-/// other programs (link::PeriodicYield).
+/// other programs (device::PeriodicYield).
 ///
 /// The values of one axis are of one tick; those of the next axis are one request later and say so with
 /// their own tick. Only the axes that are asked for are read, the rest of a row is zero.
@@ -32,7 +32,7 @@ class PolledSource final : public RowSource {
   device::Device& device_;
   std::vector<std::size_t> axes_;
   std::optional<std::uint64_t> last_tick_;
-  link::PeriodicYield yield_;
+  device::PeriodicYield yield_;
 };
 
 }  // namespace kmax::record

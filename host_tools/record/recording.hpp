@@ -16,8 +16,8 @@ struct Losses {
   std::uint64_t gaps = 0;  ///< places in the recording where some are missing
 };
 
-/// Where rows come from. Errors of all calls: link::LinkError when nothing arrives any more,
-/// device::DeviceError when the device is not the same any more (it restarted).
+/// Where rows come from. Errors of all calls: device::LinkError when nothing arrives any more,
+/// base::DeviceError when the device is not the same any more (it restarted).
 class RowSource {
  public:
   RowSource() = default;

@@ -20,7 +20,7 @@ class TelemetryRequest {
   using Connect = std::function<device::Device()>;
 
   /// `notice` gets what the destructor cannot throw. Nothing is asked for yet.
-  TelemetryRequest(Connect connect, link::Notice notice)
+  TelemetryRequest(Connect connect, device::Notice notice)
       : connect_(std::move(connect)), notice_(std::move(notice)) {}
   TelemetryRequest(const TelemetryRequest&) = delete;
   TelemetryRequest& operator=(const TelemetryRequest&) = delete;
@@ -28,14 +28,14 @@ class TelemetryRequest {
   ~TelemetryRequest();
 
   /// Also when another recording that ends has put the factory's back. True: it had to be asked for.
-  /// Errors: device::DeviceError, link::LinkError. Cost: 7 readings, and 4 writings if it is asked for.
+  /// Errors: base::DeviceError, device::LinkError. Cost: 7 readings, and 4 writings if it is asked for.
   bool ask();
   /// Once; nothing if nothing was asked for. Errors as ask().
   void put_back();
 
  private:
   Connect connect_;
-  link::Notice notice_;
+  device::Notice notice_;
   bool asked_ = false;
 };
 

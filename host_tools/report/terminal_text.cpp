@@ -7,10 +7,10 @@
 
 namespace kmax::report {
 
-using cli::display_width;
-using cli::lines_of;
-using cli::printable;
-using cli::wrapped;
+using base::display_width;
+using base::lines_of;
+using base::printable;
+using base::wrapped;
 
 namespace {
 void add_line(std::string& text, std::string line) {

@@ -11,7 +11,7 @@
 
 namespace kmax::selftest {
 
-using device::DeviceError;
+using base::DeviceError;
 using device::Parameter;
 using std::chrono::milliseconds;
 
@@ -104,7 +104,7 @@ LinkTrial Probe::try_link(int exchanges) {
     ++trial.exchanges;
     try {
       device_.read(uptime);
-    } catch (const link::LinkError&) {
+    } catch (const device::LinkError&) {
       if (++trial.lost * 5 > exchanges) throw;
       continue;
     }

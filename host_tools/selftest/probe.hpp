@@ -10,9 +10,9 @@
 namespace kmax::selftest {
 
 /// The handle stands where the test has not moved it.
-class HandleMoved : public device::DeviceError {
+class HandleMoved : public base::DeviceError {
  public:
-  using device::DeviceError::DeviceError;
+  using base::DeviceError::DeviceError;
 };
 
 /// What has become of the device, in words for the user.

@@ -54,10 +54,11 @@ class SelfTestEnded : public std::runtime_error {
 /// moved by more than a millimetre, or past excitation.travel, is a failed check.
 ///
 /// Leaves the axis disarmed and every parameter as it was; a fault that was there before is cleared, if it
-/// can be, and is in the report. Errors: DeviceError if an axis is armed, and DeviceError or link::LinkError
-/// if not even that can be read; nothing has been changed then. SelfTestEnded for everything that comes
-/// later: a lost link, an exception from `progress`, parameters that could not be put back. What `progress`
-/// throws that is no std::exception passes through, after the attempt to leave the device in order.
+/// can be, and is in the report. Errors: DeviceError if an axis is armed, and DeviceError or
+/// device::LinkError if not even that can be read; nothing has been changed then. SelfTestEnded for
+/// everything that comes later: a lost link, an exception from `progress`, parameters that could not be put
+/// back. What `progress` throws that is no std::exception passes through, after the attempt to leave the
+/// device in order.
 Report run_selftest(device::Device& device, const SelfTestSettings& settings,
                     const Probe::Progress& progress);
 

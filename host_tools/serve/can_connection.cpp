@@ -10,14 +10,14 @@ using std::chrono::microseconds;
 
 namespace {
 /// A full queue must not hold the simulation.
-const link::CanPortOptions options{.send_patience = std::chrono::milliseconds(0)};
+const device::CanPortOptions options{.send_patience = std::chrono::milliseconds(0)};
 }  // namespace
 
 CanConnection::CanConnection(const std::string& name) : name_(name) {
-  if (link::is_socket_path(name)) {
-    hub_ = std::make_unique<link::UnixCanHub>(name);
+  if (device::is_socket_path(name)) {
+    hub_ = std::make_unique<device::UnixCanHub>(name);
   } else {
-    port_ = link::open_can_port(name, options);
+    port_ = device::open_can_port(name, options);
   }
 }
 
@@ -27,8 +27,8 @@ bool CanConnection::connected() {
   if (now < next_attempt_) return false;
   next_attempt_ = now + std::chrono::milliseconds(200);
   try {
-    port_ = link::open_can_port(name_, options);
-  } catch (const link::LinkError&) {
+    port_ = device::open_can_port(name_, options);
+  } catch (const device::LinkError&) {
   }
   return port_ != nullptr;
 }
@@ -38,12 +38,12 @@ std::vector<drivers::CanFrame> CanConnection::received() {
   std::vector<drivers::CanFrame> frames;
   if (!connected()) return frames;
   try {
-    while (frames.size() < link::UnixCanHub::frames_per_client) {
+    while (frames.size() < device::UnixCanHub::frames_per_client) {
       const auto received = port_->receive(microseconds(0));
       if (!received) break;
       frames.push_back(received->frame);
     }
-  } catch (const link::LinkError&) {
+  } catch (const device::LinkError&) {
     port_.reset();
   }
   return frames;
@@ -54,9 +54,9 @@ void CanConnection::send(const drivers::CanFrame& frame) {
   if (!connected()) return;
   try {
     port_->send(frame);
-  } catch (const link::SendQueueFull&) {
+  } catch (const device::SendQueueFull&) {
     ++lost_;
-  } catch (const link::LinkError&) {
+  } catch (const device::LinkError&) {
     port_.reset();
   }
 }

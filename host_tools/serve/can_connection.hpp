@@ -14,7 +14,7 @@ namespace kmax::serve {
 /// The far end of a device's CAN transceiver: a SocketCAN interface by its name, or, if the name holds a '/',
 /// a bus that is served at that Unix domain socket. Belongs to one thread.
 ///
-/// Errors: link::LinkError, at the start only. An interface that goes down later is a cable that is pulled
+/// Errors: device::LinkError, at the start only. An interface that goes down later is a cable that is pulled
 /// out: frames are lost until it is up again, which is looked for five times a second. A bus that takes no
 /// frame now (nobody acknowledges, a client that does not fetch) loses it: the simulation does not wait.
 class CanConnection {
@@ -39,8 +39,8 @@ class CanConnection {
   bool connected();
 
   std::string name_;
-  std::unique_ptr<link::UnixCanHub> hub_;  // one of the two
-  std::unique_ptr<link::CanPort> port_;    // null while the interface is down
+  std::unique_ptr<device::UnixCanHub> hub_;  // one of the two
+  std::unique_ptr<device::CanPort> port_;    // null while the interface is down
   std::chrono::steady_clock::time_point next_attempt_;
   std::uint64_t lost_ = 0;
 };

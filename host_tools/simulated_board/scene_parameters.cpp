@@ -24,11 +24,11 @@ std::string text_of(const simulation::ParameterValue& value) {
 device::Assignment assignment_of(const std::string& name, const simulation::ParameterValue& value) {
   const device::Parameter parameter = device::resolve(name);
   if (!parameter.writable())
-    throw device::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
+    throw base::ValueError(fmt::format("{} can only be read; leave it out of the scene", name));
   if (parameter == device::Parameter::of<"store.command">() ||
       parameter == device::Parameter::of<"log.command">() ||
       parameter == device::Parameter::of<"lock.code">() || parameter == device::Parameter::of<"lock.key">())
-    throw device::ValueError(fmt::format("{} is a command, not a value; leave it out of the scene", name));
+    throw base::ValueError(fmt::format("{} is a command, not a value; leave it out of the scene", name));
   return {parameter, device::parse_value(parameter, text_of(value))};
 }
 
@@ -76,7 +76,7 @@ std::optional<std::string> check_parameter(const std::string& name, const simula
   try {
     assignment_of(name, value);
     return std::nullopt;
-  } catch (const device::ValueError& error) {
+  } catch (const base::ValueError& error) {
     return error.what();
   }
 }

@@ -62,8 +62,8 @@ NamedSetting resolve_setting(std::string_view name) {
     if (std::find(known.begin(), known.end(), parameter.name()) == known.end())
       known.push_back(parameter.name());
   }
-  const std::string meant = device::did_you_mean(name, known);
-  throw device::ValueError(
+  const std::string meant = base::did_you_mean(name, known);
+  throw base::ValueError(
       fmt::format("'{}' is neither a key of a scene nor a parameter{}", name,
                   meant.empty() ? "; 'kmax simulate --keys' and 'kmax list' show them" : meant));
 }
@@ -71,10 +71,10 @@ NamedSetting resolve_setting(std::string_view name) {
 simulation::SceneSetting split_setting(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
-    throw device::ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
+    throw base::ValueError(fmt::format("'{}': write NAME=VALUE, as in wall.stiffness=3580", text));
   const std::string_view whole = text;
-  return {std::string(device::trimmed(whole.substr(0, equals))),
-          std::string(device::trimmed(whole.substr(equals + 1)))};
+  return {std::string(base::trimmed(whole.substr(0, equals))),
+          std::string(base::trimmed(whole.substr(equals + 1)))};
 }
 
 std::vector<simulation::SceneSetting> parse_settings(const std::vector<std::string>& texts) {
@@ -84,7 +84,7 @@ std::vector<simulation::SceneSetting> parse_settings(const std::vector<std::stri
     setting.name = resolve_setting(setting.name).name;
     for (const auto& earlier : settings) {
       if (earlier.name == setting.name)
-        throw device::ValueError(fmt::format("{}: it is given twice", setting.name));
+        throw base::ValueError(fmt::format("{}: it is given twice", setting.name));
     }
     settings.push_back(std::move(setting));
   }

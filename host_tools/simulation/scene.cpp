@@ -390,8 +390,8 @@ class SceneReader : private SceneTables {
     const auto* text = std::get_if<std::string>(&parameter->value);
     if (text == nullptr) return std::nullopt;
     try {
-      return device::written_number(*text, unit, "a number", "a number").value;
-    } catch (const device::ValueError&) {
+      return base::written_number(*text, unit, "a number", "a number").value;
+    } catch (const base::ValueError&) {
       return std::nullopt;  // the caller's check has its own words for it
     }
   }

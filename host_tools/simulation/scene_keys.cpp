@@ -17,10 +17,10 @@ class KeyList {
                std::string_view motor = "", bool with_default = true) {
     for (const ModelField<Model>& field : fields) {
       std::string allowed =
-          fmt::format("{} .. {}", device::number_text(field.minimum), device::number_text(field.maximum));
+          fmt::format("{} .. {}", base::number_text(field.minimum), base::number_text(field.maximum));
       if (!field.note.empty()) allowed += fmt::format(" ({})", field.note);
       keys.push_back({table, field.name, SceneValue::number, motor, field.unit,
-                      with_default ? device::number_text(Model{}.*field.member) : "", std::move(allowed),
+                      with_default ? base::number_text(Model{}.*field.member) : "", std::move(allowed),
                       field.meaning});
     }
   }

@@ -51,7 +51,7 @@ void insert_text(toml::table& table, std::string_view name, SceneValue type, std
     toml::array words;
     for (std::size_t at = 0; at < text.size();) {
       const std::size_t comma = std::min(text.find(',', at), text.size());
-      words.push_back(std::string(device::trimmed(text.substr(at, comma - at))));
+      words.push_back(std::string(base::trimmed(text.substr(at, comma - at))));
       at = comma + 1;
     }
     table.insert_or_assign(name, std::move(words));

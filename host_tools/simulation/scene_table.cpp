@@ -39,7 +39,7 @@ void SceneTables::require_known(const toml::table& table, std::string_view prefi
     const std::vector<std::string> names(allowed.begin(), allowed.end());
     fail(key.source(),
          fmt::format("{}{} = {}: unknown key; allowed here: {}{}", prefix, key.str(), text_of(node),
-                     fmt::join(names, ", "), device::did_you_mean(key.str(), names)));
+                     fmt::join(names, ", "), base::did_you_mean(key.str(), names)));
   }
 }
 
@@ -72,7 +72,7 @@ std::optional<std::size_t> SceneTables::read_choice(const toml::table& table, st
     const std::string given = node->is_string() ? node->as_string()->get() : "";
     const std::vector<std::string> names(words.begin(), words.end());
     fail(node->source(), fmt::format("{}{} = {}: allowed is {}{}", prefix, name, text_of(*node),
-                                     one_of(words), device::did_you_mean(given, names)));
+                                     one_of(words), base::did_you_mean(given, names)));
   }
   return static_cast<std::size_t>(word - words.begin());
 }
@@ -84,8 +84,8 @@ std::optional<double> SceneTables::number_of(const toml::node& node, std::string
   if (node.is_number()) return node.value<double>();
   if (!node.is_string()) return std::nullopt;
   try {
-    return device::written_number(node.as_string()->get(), unit, "a number", "a smaller one").value;
-  } catch (const device::ValueError& error) {
+    return base::written_number(node.as_string()->get(), unit, "a number", "a smaller one").value;
+  } catch (const base::ValueError& error) {
     fail(node.source(), fmt::format("{} = {}; allowed is {}", name, error.what(), allowed));
   }
 }

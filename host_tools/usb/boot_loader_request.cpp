@@ -36,7 +36,7 @@ std::string request_failure(const UsbDevice& device, const std::filesystem::path
 
 void restart_into_boot_loader(const UsbDevice& device, const std::filesystem::path& nodes) {
   const std::filesystem::path node = nodes / device.node();
-  const link::FileDescriptor file(open(node.c_str(), O_RDWR | O_CLOEXEC));
+  const base::FileDescriptor file(open(node.c_str(), O_RDWR | O_CLOEXEC));
   if (!file) throw RequestError(request_failure(device, node, errno));
   usbdevfs_ctrltransfer transfer{};
   transfer.bRequestType = 0x40;  // vendor, to the device

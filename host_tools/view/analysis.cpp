@@ -49,7 +49,7 @@ void Analysis::want_map(std::size_t axis, const std::string& up) {
     changed_.notify_all();
     return;
   }
-  throw device::ValueError("there is no map with '" + up + "' upwards; there are " + names);
+  throw base::ValueError("there is no map with '" + up + "' upwards; there are " + names);
 }
 
 void Analysis::run() {

@@ -26,7 +26,7 @@ class Analysis {
 
   /// For any thread; does not wait.
   void parameters(const firmware::ParameterValues& values);
-  /// From now on also the map of wall.stiffness and the parameter of this name. Throws device::ValueError if
+  /// From now on also the map of wall.stiffness and the parameter of this name. Throws base::ValueError if
   /// there is no such map.
   void want_map(std::size_t axis, const std::string& up);
 

@@ -54,7 +54,7 @@ void CaptureRun::look() {
     const auto progress = reader_->look();
     if (progress) return show(*progress);
     publish_(capture_message(reader_->read(show), settings_));
-  } catch (const link::LinkError&) {
+  } catch (const device::LinkError&) {
     reader_.reset();
     throw;
   } catch (const ForceRemoved& removed) {

@@ -18,7 +18,7 @@ class CaptureRun {
   void begin(const device::CaptureSettings& settings);
 
   /// Looks, if it is time; reads the samples once they are complete. What goes wrong is published, but for
-  /// link::LinkError and ForceRemoved.
+  /// device::LinkError and ForceRemoved.
   void look();
 
   /// Gives up the one that is under way, if any.

@@ -58,7 +58,7 @@ std::unique_ptr<UrgentLink> Conversation::urgent_link() {
   const auto request = reach_.open_bus ? UrgentLink::Request::object : UrgentLink::Request::group;
   return std::make_unique<UrgentLink>(
       *link_, request, [this] { removal_.interrupt_if_urgent(); },
-      [this](std::span<const link::SlotValue> values) { removal_.refuse_to_arm(values); });
+      [this](std::span<const device::SlotValue> values) { removal_.refuse_to_arm(values); });
 }
 
 void Conversation::start_rows() {
@@ -74,7 +74,7 @@ void Conversation::start_rows() {
       stream_ = std::make_unique<RowStream>(reach_.open_bus(record::port_options(plan)), plan, publish_);
       return;
     }
-  } catch (const device::DeviceError& error) {
+  } catch (const base::DeviceError& error) {
     state_.rows_trouble = fmt::format("rows are asked for one by one, since {}", error.what());
   }
   polled_.emplace(device_, all_axes());
@@ -159,7 +159,7 @@ void Conversation::carry_out(const Command& command) {
   } catch (const ForceRemoved& removed) {
     publish_(reply(command.id, false, removed.what(), command.client));
     settle();
-  } catch (const link::LinkError& error) {
+  } catch (const device::LinkError& error) {
     publish_(reply(command.id, false, error.what(), command.client));
     throw;
   } catch (const std::exception& error) {
@@ -173,14 +173,14 @@ std::string Conversation::do_it(const Command& command) {
                                                   Command::Kind::cancel};
   if (procedure_.begun() &&
       std::ranges::find(beside_a_procedure, command.kind) == std::end(beside_a_procedure))
-    throw device::ValueError("a procedure is under way: wait for its end, or cancel it");
+    throw base::ValueError("a procedure is under way: wait for its end, or cancel it");
   Drive drive(device_, command.axis);
   switch (command.kind) {
     case Command::Kind::alive:
       return {};
     case Command::Kind::stop:
       // It has been carried out before anything else.
-      if (!last_stop_trouble_.empty()) throw device::DeviceError(last_stop_trouble_);
+      if (!last_stop_trouble_.empty()) throw base::DeviceError(last_stop_trouble_);
       return "the force is off";
     case Command::Kind::arm:
       return arm(command);
@@ -206,7 +206,7 @@ std::string Conversation::do_it(const Command& command) {
       return {};
     case Command::Kind::capture:
       if (const std::string why = too_long_while_armed(command.capture); !why.empty() && any_armed())
-        throw device::ValueError(
+        throw base::ValueError(
             fmt::format("an axis is armed, and the capture is too long for that: {}; or disarm first", why));
       capture_.begin(command.capture);
       return "the device looks for the trigger";
@@ -216,7 +216,7 @@ std::string Conversation::do_it(const Command& command) {
       procedure_.answer(command.client, command.prompt);
       return {};
     case Command::Kind::cancel:
-      if (!procedure_.begun()) throw device::ValueError("no procedure is under way");
+      if (!procedure_.begun()) throw base::ValueError("no procedure is under way");
       procedure_.cancel("cancelled");
       return "it ends, and the axis is disarmed";
     case Command::Kind::keep:
@@ -254,7 +254,7 @@ std::string Conversation::arm(const Command& command) {
   if (before.armed()) return fmt::format("axis {} was armed already; who armed it keeps it", command.axis);
   if (const auto* capture = capture_.settings()) {
     if (const std::string why = too_long_while_armed(*capture); !why.empty())
-      throw device::ValueError(
+      throw base::ValueError(
           fmt::format("axis {} was not armed: a capture is under way, and too long for that: {}; wait for "
                       "its end, or begin "
                       "a shorter one in its place",
@@ -274,7 +274,7 @@ std::string Conversation::arm(const Command& command) {
 }
 
 std::string Conversation::start(const Command& command) {
-  if (any_armed()) throw device::ValueError("it was not started: an axis is armed; disarm it first");
+  if (any_armed()) throw base::ValueError("it was not started: an axis is armed; disarm it first");
   capture_.end("a procedure has taken the device's capture");
   Drive drive(device_, command.axis);
   if (drive.status().state() == firmware::DriveState::quick_stop_active) drive.disarm();

@@ -25,7 +25,7 @@ namespace kmax::view {
 /// One connection to the device: carries commands out, and publishes state, parameters and rows. Belongs to
 /// the thread that makes it.
 ///
-/// Errors of all calls: link::LinkError, device::DeviceError, and of the constructor ForceRemoved too; then
+/// Errors of all calls: device::LinkError, base::DeviceError, and of the constructor ForceRemoved too; then
 /// it has to be made again.
 class Conversation {
  public:
@@ -74,7 +74,7 @@ class Conversation {
   ParameterMirror& mirror_;
   Publish publish_;
 
-  std::unique_ptr<link::Link> link_;
+  std::unique_ptr<device::Link> link_;
   ForceRemoval removal_;
   const UrgentLink* urgent_ = nullptr;  ///< the device's
   device::Device device_;
@@ -84,7 +84,7 @@ class Conversation {
   std::optional<record::PolledSource> polled_;
   std::optional<RowBatch> batch_;
   std::unique_ptr<RowStream> stream_;
-  link::PeriodicYield yield_;
+  device::PeriodicYield yield_;
 
   LinkState state_{.connected = true};
   std::vector<AxisState> axes_;

@@ -66,7 +66,7 @@ void DeviceSession::disarm() {
     disarm_of_clients(device, commands_);
   } catch (const std::exception& error) {
     const double timeout = mirror_.values().real<"link.timeout">();
-    throw device::DeviceError(fmt::format("{}; {}", error.what(), device::words_for_disarm_failure(timeout)));
+    throw base::DeviceError(fmt::format("{}; {}", error.what(), device::words_for_disarm_failure(timeout)));
   }
 }
 

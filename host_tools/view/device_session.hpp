@@ -12,11 +12,11 @@ namespace kmax::view {
 /// Belongs to one thread.
 class DeviceSession {
  public:
-  /// All must outlive it. Connects. Errors: link::LinkError, device::DeviceError.
+  /// All must outlive it. Connects. Errors: device::LinkError, base::DeviceError.
   DeviceSession(Reach reach, DeviceFacts facts, CommandQueue& commands, Analysis& analysis, Publish publish);
 
   /// Until `ended`, which is asked at least every 100 ms; then disarms what clients have armed, by a new link
-  /// if the one that is there fails or is lost. Throws only if that is not possible: device::DeviceError,
+  /// if the one that is there fails or is lost. Throws only if that is not possible: base::DeviceError,
   /// which says what becomes of the force.
   void run(const std::function<bool()>& ended);
 

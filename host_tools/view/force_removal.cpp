@@ -41,10 +41,10 @@ void ForceRemoval::remove_if_urgent() {
   removing_ = true;
   try {
     for (const std::size_t axis : axes_in_order()) {
-      const link::SlotValue word{Parameter::of<"drive.controlword">(axis).slot(), quick_stop_now};
+      const device::SlotValue word{Parameter::of<"drive.controlword">(axis).slot(), quick_stop_now};
       try {
-        link_.write({&word, 1}, link::Repeat::if_lost);
-      } catch (const link::RefusedError&) {
+        link_.write({&word, 1}, device::Repeat::if_lost);
+      } catch (const device::RefusedError&) {
         // An axis that takes no commands makes no force; settle() looks.
       }
     }
@@ -63,9 +63,9 @@ void ForceRemoval::interrupt_if_urgent() {
   if (removed_) throw ForceRemoved("ended, because " + to_string(removed_->why));
 }
 
-void ForceRemoval::refuse_to_arm(std::span<const link::SlotValue> values) const {
+void ForceRemoval::refuse_to_arm(std::span<const device::SlotValue> values) const {
   if (!removed_ || removing_) return;
-  for (const link::SlotValue& value : values) {
+  for (const device::SlotValue& value : values) {
     if (Parameter::at(value.slot).entry() == firmware::entry_of<"drive.controlword">() &&
         firmware::asks_for_operation(static_cast<std::uint16_t>(value.raw)))
       throw ForceRemoved("not armed again, because " + to_string(removed_->why));
@@ -96,7 +96,7 @@ std::optional<ForceRemoval::Settled> ForceRemoval::settle(device::Device& device
     try {
       if (drive.status().armed()) drive.stop();
       if (removed_->why != Urgency::Why::asked && commands_.owner(axis)) drive.disarm();
-    } catch (const device::DeviceError& error) {
+    } catch (const base::DeviceError& error) {
       settled.report.trouble = error.what();
     }
   }

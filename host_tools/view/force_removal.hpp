@@ -22,10 +22,10 @@ class ForceRemoved : public std::runtime_error {
 class ForceRemoval {
  public:
   /// Both must outlive it.
-  ForceRemoval(link::Link& link, CommandQueue& commands) : link_(link), commands_(commands) {}
+  ForceRemoval(device::Link& link, CommandQueue& commands) : link_(link), commands_(commands) {}
 
-  /// If it is urgent, takes the force; settle() has to follow. link::LinkError if the device does not answer:
-  /// then it is urgent still.
+  /// If it is urgent, takes the force; settle() has to follow. device::LinkError if the device does not
+  /// answer: then it is urgent still.
   void remove_if_urgent();
   /// The same before every request: throws ForceRemoved if it took the force.
   void interrupt_if_urgent();
@@ -33,7 +33,7 @@ class ForceRemoval {
   bool removed() const { return removed_.has_value(); }
   /// Before these are written: throws ForceRemoved if that would arm an axis between the two. What was going
   /// on may go on to tidy up.
-  void refuse_to_arm(std::span<const link::SlotValue> values) const;
+  void refuse_to_arm(std::span<const device::SlotValue> values) const;
 
   struct Settled {
     StopReport report;
@@ -46,7 +46,7 @@ class ForceRemoval {
  private:
   std::vector<std::size_t> axes_in_order() const;
 
-  link::Link& link_;
+  device::Link& link_;
   CommandQueue& commands_;
   bool removing_ = false;
   std::optional<Urgency> removed_;
@@ -54,7 +54,7 @@ class ForceRemoval {
 };
 
 /// Disarms what clients have armed, each axis even if another one fails; the first failure is then thrown:
-/// link::LinkError, device::DeviceError. An axis that failed stays its client's.
+/// device::LinkError, base::DeviceError. An axis that failed stays its client's.
 void disarm_of_clients(device::Device& device, CommandQueue& commands);
 
 }  // namespace kmax::view

@@ -73,7 +73,7 @@ void ProcedureRun::run(bool asks_before_touches, const std::function<void()>& at
     try {
       result = run_procedure(device_, settings_, party);
       phase = result.pass ? Phase::passed : Phase::failed;
-    } catch (const link::LinkError&) {
+    } catch (const device::LinkError&) {
       throw;
     } catch (const std::exception& error) {
       result = {.words = error.what()};
@@ -84,7 +84,7 @@ void ProcedureRun::run(bool asks_before_touches, const std::function<void()>& at
     else
       put_back(before);
     conclude(phase, result.words);
-  } catch (const link::LinkError& error) {
+  } catch (const device::LinkError& error) {
     conclude(Phase::broken_off, error.what());
     throw;
   } catch (const std::exception& error) {
@@ -100,7 +100,7 @@ void ProcedureRun::put_back(const std::vector<Assignment>& before) {
       return device_.apply(way_back_to(before, device_));
     } catch (const ForceRemoved&) {
       continue;
-    } catch (const link::LinkError&) {
+    } catch (const device::LinkError&) {
       throw;
     } catch (const std::exception& error) {
       return note_left(error.what());
@@ -142,9 +142,9 @@ void ProcedureRun::ask(const std::string& what_to_do) {
 
 void ProcedureRun::answer(ClientId client, std::uint32_t prompt) {
   if (!begun() || !state_.waits || prompt != state_.prompt_number)
-    throw device::ValueError(fmt::format("prompt {} does not wait for an answer", prompt));
+    throw base::ValueError(fmt::format("prompt {} does not wait for an answer", prompt));
   if (client != state_.client)
-    throw device::ValueError("another page has started this: only that one answers its prompts");
+    throw base::ValueError("another page has started this: only that one answers its prompts");
   state_.waits = false;
 }
 
@@ -163,7 +163,7 @@ void ProcedureRun::conclude(Phase phase, std::string words) {
 }
 
 const std::vector<Assignment>& ProcedureRun::way_back() const {
-  if (before_.empty()) throw device::ValueError("no result waits for a decision");
+  if (before_.empty()) throw base::ValueError("no result waits for a decision");
   return before_;
 }
 

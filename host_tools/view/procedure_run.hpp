@@ -25,8 +25,8 @@ class ProcedureRun final : private bench::Prompter {
   void begin(const ProcedureSettings& settings, ClientId client);
   bool begun() const { return state_.phase == ProcedureState::Phase::running; }
 
-  /// To its end, which is published and is no error of this call, but for link::LinkError. `attend` is called
-  /// a few times a second, while the procedure asks nothing of the device: for all else that goes on.
+  /// To its end, which is published and is no error of this call, but for device::LinkError. `attend` is
+  /// called a few times a second, while the procedure asks nothing of the device: for all else that goes on.
   void run(bool asks_before_touches, const std::function<void()>& attend);
 
   /// The prompt of this number has been done. ValueError: who has not started it, or another prompt.

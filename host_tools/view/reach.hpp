@@ -9,12 +9,12 @@
 
 namespace kmax::view {
 
-/// How a device is reached. Errors of both: link::LinkError.
+/// How a device is reached. Errors of both: device::LinkError.
 struct Reach {
   std::string address{};
-  std::function<std::unique_ptr<link::Link>()> open_link{};
+  std::function<std::unique_ptr<device::Link>()> open_link{};
   /// Null: the device is not on a CAN bus, so that its rows are asked for one by one.
-  std::function<std::unique_ptr<link::CanPort>(const link::CanPortOptions&)> open_bus{};
+  std::function<std::unique_ptr<device::CanPort>(const device::CanPortOptions&)> open_bus{};
   std::uint8_t node = 0;
   bool own_time = false;  ///< simulated in this process, where its time may pass faster than the user's
 };

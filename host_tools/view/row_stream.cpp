@@ -5,7 +5,7 @@
 
 namespace kmax::view {
 
-RowStream::RowStream(std::unique_ptr<link::CanPort> port, const record::PdoPlan& plan, Publish publish)
+RowStream::RowStream(std::unique_ptr<device::CanPort> port, const record::PdoPlan& plan, Publish publish)
     : port_(std::move(port)), thread_([this, plan, publish = std::move(publish)] { run(plan, publish); }) {}
 
 RowStream::~RowStream() {

@@ -17,7 +17,7 @@ namespace kmax::view {
 class RowStream {
  public:
   /// `plan` is fresh, as for record::CanSource.
-  RowStream(std::unique_ptr<link::CanPort> port, const record::PdoPlan& plan, Publish publish);
+  RowStream(std::unique_ptr<device::CanPort> port, const record::PdoPlan& plan, Publish publish);
   ~RowStream();
   RowStream(const RowStream&) = delete;
   RowStream& operator=(const RowStream&) = delete;
@@ -30,7 +30,7 @@ class RowStream {
  private:
   void run(const record::PdoPlan& plan, const Publish& publish);
 
-  std::unique_ptr<link::CanPort> port_;
+  std::unique_ptr<device::CanPort> port_;
   std::atomic<bool> ended_{false}, ask_again_{false};
   mutable std::mutex mutex_;
   std::string trouble_;

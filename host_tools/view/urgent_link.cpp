@@ -27,7 +27,7 @@ std::vector<std::uint32_t> UrgentLink::read(std::span<const std::size_t> slots) 
   return values;
 }
 
-void UrgentLink::write(std::span<const link::SlotValue> values, link::Repeat repeat,
+void UrgentLink::write(std::span<const device::SlotValue> values, device::Repeat repeat,
                        const std::function<void()>& before_request) {
   ForwardingLink::write(values, repeat, [&] {
     urgent_();

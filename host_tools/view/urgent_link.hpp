@@ -16,20 +16,20 @@ namespace kmax::view {
 /// shown all that is going to be written.
 ///
 /// Belongs to one thread, as the link beneath, which must outlive it.
-class UrgentLink final : public link::ForwardingLink {
+class UrgentLink final : public device::ForwardingLink {
  public:
   /// Values of one request: a group of the dictionary over Modbus, a single object over CANopen.
   enum class Request { group, object };
 
-  UrgentLink(link::Link& beneath, Request request, std::function<void()> urgent,
-             std::function<void(std::span<const link::SlotValue>)> write_allowed)
+  UrgentLink(device::Link& beneath, Request request, std::function<void()> urgent,
+             std::function<void(std::span<const device::SlotValue>)> write_allowed)
       : ForwardingLink(beneath),
         request_(request),
         urgent_(std::move(urgent)),
         write_allowed_(std::move(write_allowed)) {}
 
   std::vector<std::uint32_t> read(std::span<const std::size_t> slots) override;
-  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+  void write(std::span<const device::SlotValue> values, device::Repeat repeat,
              const std::function<void()>& before_request = {}) override;
   std::vector<std::uint32_t> read_trace(std::size_t first, std::size_t count) override;
   std::vector<std::uint32_t> read_capture(std::size_t count, const Progress& progress) override;
@@ -45,7 +45,7 @@ class UrgentLink final : public link::ForwardingLink {
   Request request_;
   bool in_transfer_ = false;
   std::function<void()> urgent_;
-  std::function<void(std::span<const link::SlotValue>)> write_allowed_;
+  std::function<void(std::span<const device::SlotValue>)> write_allowed_;
 };
 
 }  // namespace kmax::view

@@ -51,6 +51,13 @@ FOLDERS = {
         ["libkmax"],
     ],
 }
+# What a file defines stands in the namespace of its folder on the floor of the host tools, and of its floor on the others,
+# or in one of these.
+NAMESPACES = {
+    "board/stm32f405/tick_code.cpp": ["kmax::board", "kmax::drivers"],  # the tick's drivers once more, for its memory
+    "host_tools/kmax/": ["kmax::cli"],
+    "host_tools/libkmax/": ["kmax::library", "kmax"],  # what users write is short
+}
 # Standard headers whose contents need a heap, an operating system or libm.
 NOT_ON_THE_DEVICE = set("""
     any chrono cmath complex condition_variable cstdio cstdlib deque exception filesystem format fstream functional
@@ -191,6 +198,19 @@ def telling_names(tree):
                 yield path, f"'{part}' says nothing"
 
 
+def namespaces(tree):
+    """A reader who has a name's namespace has its folder, and the other way round."""
+    for path, text in product(tree).items():
+        floor, folder = path.split("/")[:2]
+        allowed = next((spaces for place, spaces in NAMESPACES.items() if path.startswith(place)),
+                       [f"kmax::{folder if floor == 'host_tools' else floor}"])
+        for number, line in enumerate(text.splitlines(), 1):
+            opened = re.match(r"namespace (kmax[\w:]*) \{", line)
+            if opened and not any(opened[1] == space or (opened[1].startswith(space + "::") and space != "kmax")
+                                  for space in allowed):
+                yield path, f"{path}:{number}: {opened[1]} is not in {' or '.join(allowed)}"
+
+
 def test_namespaces(tree):
     """What a test file defines stands in a namespace of the file's name: a unity build compiles several as one."""
     for path, text in tree.items():
@@ -202,7 +222,7 @@ def test_namespaces(tree):
 
 
 RULES = [floors, folder_order, pragma_once, class_in_one_place, class_size, friends, using_namespace, telling_names,
-         test_namespaces]
+         namespaces, test_namespaces]
 
 
 def repository():
@@ -309,6 +329,15 @@ class EachRuleSees(unittest.TestCase):
         self.good(telling_names, "host_tools/base/units.hpp", "")
         self.bad(telling_names, "host_tools/utils/units.hpp", "")
         self.bad(telling_names, "firmware/axis_manager.hpp", "")
+
+    def test_namespaces(self):
+        self.good(namespaces, "host_tools/device/can/a.hpp", "namespace kmax::device {\n")
+        self.good(namespaces, "firmware/canopen/a.hpp", "namespace kmax::firmware::canopen {\n")
+        self.good(namespaces, "host_tools/kmax/a.hpp", "namespace kmax::cli {\n")
+        self.bad(namespaces, "host_tools/base/a.hpp", "namespace kmax::device {\n")
+        self.bad(namespaces, "host_tools/base/a.hpp", "namespace kmax {\n")
+        self.bad(namespaces, "host_tools/libkmax/a.hpp", "namespace kmax::device {\n")
+        self.bad(namespaces, "control/a.hpp", "namespace kmax::firmware {\n")
 
     def test_test_namespaces(self):
         self.good(test_namespaces, "tests/a/b_test.cpp", "namespace kmax::a::b_test {\nTEST(A, B) {}\n}\n")

@@ -59,20 +59,21 @@ void run_all(std::string_view text) {
   const std::vector<std::string> arguments = arguments_in(text);
   std::ostringstream out, messages;
   Context context(out, messages,
-                  [](const std::string& address, const link::Notice&) -> std::unique_ptr<link::Link> {
-                    throw device::DeviceError("there is no device at '" + address + "' here");
+                  [](const std::string& address, const device::Notice&) -> std::unique_ptr<device::Link> {
+                    throw base::DeviceError("there is no device at '" + address + "' here");
                   });
   CLI::App app;
   const std::optional<int> ended = parse(app, arguments, context);
   if (!ended && !may_act(arguments)) return;
   const int code = ended ? *ended : act(context);
-  require(code == done || code == failed || code == wrong_usage || code == verdict_is_no,
-          "no exit code of kmax");
+  require(
+      code == base::done || code == base::failed || code == base::wrong_usage || code == base::verdict_is_no,
+      "no exit code of kmax");
   const std::string said = messages.str(), printed = out.str();
-  if (code == done || code == verdict_is_no)
+  if (code == base::done || code == base::verdict_is_no)
     return require(!printed.empty() || !said.empty(), "done without a word");
   require(said.starts_with("kmax: ") && said.size() > 10, "an error without a message");
-  require(code != wrong_usage || names_one(said, arguments) || names_missing(said), said.c_str());
+  require(code != base::wrong_usage || names_one(said, arguments) || names_missing(said), said.c_str());
   if (!context.json) return require(printed.empty(), "an error among the results");
   const Json document = Json::parse(printed, nullptr, false);
   require(document.is_object() && document.size() == 1 && document.contains("error"),

@@ -36,7 +36,7 @@ void read(std::string_view text) {
   std::vector<FileSetting> settings;
   try {
     settings = parse_parameter_file(text, "fuzzed");
-  } catch (const ValueError& error) {
+  } catch (const base::ValueError& error) {
     const std::string_view message = error.what();
     require(!message.empty() && says_where(message.substr(0, message.find('\n'))), error.what());
     return;

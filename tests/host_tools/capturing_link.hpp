@@ -12,7 +12,7 @@ namespace kmax::host_tools_test {
 
 /// A link to a device that consists of registers and the firmware's own capture. Its ticks pass with each
 /// request (5 ms) and in wait(); in tick t channel c has the word `word_of(t, c)`.
-class CapturingLink final : public link::RegisterLink {
+class CapturingLink final : public device::RegisterLink {
  public:
   using Exception = firmware::modbus::Exception;
 
@@ -136,11 +136,11 @@ class CapturingLink final : public link::RegisterLink {
     ++requests;
     if (before_request) before_request(requests);
     pass(5'000);
-    if (lost) throw link::LinkError("request lost");
+    if (lost) throw device::LinkError("request lost");
     std::vector<std::uint16_t> words(count);
     const auto exception = execute(std::span<std::uint16_t>(words));
     if (exception != Exception::none)
-      throw link::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
+      throw device::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
     return words;
   }
 };

@@ -27,7 +27,7 @@ inline std::vector<std::uint32_t> all_settings(device::Device& device) {
 }
 
 /// A simulated board in virtual time behind a link that can be cut and that tells of its requests.
-class DisturbedLink final : public link::RegisterLink {
+class DisturbedLink final : public device::RegisterLink {
  public:
   explicit DisturbedLink(const simulation::Scene& scene) : sim(scene) {}
 
@@ -52,14 +52,14 @@ class DisturbedLink final : public link::RegisterLink {
   std::chrono::microseconds now() const override { return sim.now(); }
   void wait(std::chrono::microseconds duration) override { sim.wait(duration); }
 
-  link::SimLink sim;
+  device::SimLink sim;
   bool cut = false;
   std::function<void()> before_request;  ///< may be empty; what it throws, the request throws
 
  private:
   void require() const {
     if (before_request) before_request();
-    if (cut) throw link::LinkError("the cable is gone");
+    if (cut) throw device::LinkError("the cable is gone");
   }
 };
 

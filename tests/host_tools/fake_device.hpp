@@ -142,7 +142,7 @@ class FakeDevice {
 };
 
 /// A link that can lose messages, to a device that outlives it.
-class FakeLink final : public link::RegisterLink {
+class FakeLink final : public device::RegisterLink {
  public:
   enum class Loss { none, request, reply };
 
@@ -155,7 +155,7 @@ class FakeLink final : public link::RegisterLink {
     return read_registers(4, address, count, [&](auto out) { return device_->read_input(address, out); });
   }
   /// CANopen's own settings as over CAN, which alone writes them.
-  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+  void write(std::span<const device::SlotValue> values, device::Repeat repeat,
              const std::function<void()>& before = {}) override {
     if (values.size() != 1 || !firmware::canopen::is_communication(values[0].slot))
       return RegisterLink::write(values, repeat, before);
@@ -189,12 +189,12 @@ class FakeLink final : public link::RegisterLink {
     if (before_request) before_request(requests);
     const bool lost = loss != Loss::none && first_lost <= requests && requests <= last_lost;
     device_->pass(lost ? 500'000 : 5'000);
-    if (lost && loss == Loss::request) throw link::LinkError("request lost");
+    if (lost && loss == Loss::request) throw device::LinkError("request lost");
     const auto exception = execute();
     if (after_request) after_request(requests);
-    if (lost) throw link::LinkError("reply lost");
+    if (lost) throw device::LinkError("reply lost");
     if (exception != firmware::modbus::Exception::none)
-      throw link::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
+      throw device::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
   }
   template <typename Execute>
   std::vector<std::uint16_t> read_registers(std::uint8_t function, std::uint16_t address, std::uint16_t count,

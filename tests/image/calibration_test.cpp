@@ -29,7 +29,7 @@ struct Bench {
   device::Device device;
 
  private:
-  static std::unique_ptr<link::Link> started(ImageBench& image) {
+  static std::unique_ptr<device::Link> started(ImageBench& image) {
     image.start();
     return std::make_unique<virtual_board::BoardLink>(*image.board);
   }

@@ -13,7 +13,7 @@
 namespace kmax::tests {
 
 /// A host on the virtual board's CAN bus: the host tools' own port, in board time. Waiting runs the board.
-class BoardCanPort final : public link::CanPort {
+class BoardCanPort final : public device::CanPort {
  public:
   explicit BoardCanPort(virtual_board::VirtualBoard& board, std::uint32_t bit_rate = 1'000'000)
       : board_(board), node_(board.can_bus(), bit_rate) {
@@ -27,12 +27,12 @@ class BoardCanPort final : public link::CanPort {
     ++counters_.sent;
   }
   /// Frames carry board time, at which their last bit was over.
-  std::optional<link::Received> receive(std::chrono::microseconds wait) override {
+  std::optional<device::Received> receive(std::chrono::microseconds wait) override {
     const virtual_board::BoardTime end = board_.now() + static_cast<virtual_board::BoardTime>(wait.count()) *
                                                             (virtual_board::units_per_second / 1'000'000);
     while (received_.empty() && board_.now() < end) board_.run_for(10e-6);
     if (received_.empty()) return std::nullopt;
-    const link::Received first = received_.front();
+    const device::Received first = received_.front();
     received_.pop_front();
     ++counters_.received;
     return first;
@@ -50,12 +50,12 @@ class BoardCanPort final : public link::CanPort {
 
   virtual_board::VirtualBoard& board_;
   virtual_board::CanHostNode node_;
-  std::deque<link::Received> received_;
+  std::deque<device::Received> received_;
 };
 
 /// The client's own clock is the real one, which a busy machine makes short.
-inline link::SdoSettings patient_sdo() {
-  link::SdoSettings settings;
+inline device::SdoSettings patient_sdo() {
+  device::SdoSettings settings;
   settings.response_timeout = std::chrono::seconds(20);
   settings.block_silence = std::chrono::seconds(10);
   settings.attempts = 1;
@@ -86,7 +86,7 @@ class CanBench : public ImageBench {
   }
 
   /// The next frame with this identifier within `wait_s` of board time.
-  std::optional<link::Received> next(std::uint32_t identifier, double wait_s) {
+  std::optional<device::Received> next(std::uint32_t identifier, double wait_s) {
     const double end = virtual_board::seconds(board->now()) + wait_s;
     while (true) {
       const double left = end - virtual_board::seconds(board->now());
@@ -150,7 +150,7 @@ class CanBench : public ImageBench {
   }
 
   BoardCanPort port;
-  link::SdoClient sdo;
+  device::SdoClient sdo;
 };
 
 }  // namespace kmax::tests

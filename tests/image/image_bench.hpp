@@ -27,8 +27,8 @@ inline std::string image_path() {
   return path;
 }
 
-inline const ElfImage& image() {
-  static const ElfImage loaded = ElfImage::load(image_path());
+inline const base::ElfImage& image() {
+  static const base::ElfImage loaded = base::ElfImage::load(image_path());
   return loaded;
 }
 

@@ -117,7 +117,7 @@ class FullLoad {
     try {
       bench_.write("store.command", 0, 1);
       throw std::runtime_error("a save is not refused while armed");
-    } catch (const link::RegisterRefused&) {
+    } catch (const device::RegisterRefused&) {
       ++refused_;
     }
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)

@@ -79,8 +79,8 @@ class ImageRig final : public Rig {
     for (std::size_t axis = 0; axis < switched_on_.size(); ++axis)
       switched_on_[axis] = bench_.world.drive(axis).encoder().edges();
   }
-  static ElfSymbol symbol(const std::string& name) { return tests::image().required_symbol(name); }
-  static ElfSymbol application() { return symbol("_ZN4kmax5board12_GLOBAL__N_111applicationE"); }
+  static base::ElfSymbol symbol(const std::string& name) { return tests::image().required_symbol(name); }
+  static base::ElfSymbol application() { return symbol("_ZN4kmax5board12_GLOBAL__N_111applicationE"); }
   std::uint32_t& word(std::uint32_t address) {
     return *reinterpret_cast<std::uint32_t*>(board_.bus().memory(address, 4).data());
   }

@@ -77,7 +77,7 @@ class Installed(unittest.TestCase):
                 self.assertTrue(one.startswith("kmax/") or "/" not in one, f"{path} includes {one}")
                 self.assertTrue("/" not in one or (self.prefix / "include" / one).is_file(), f"{path} includes {one}")
         shown = run("nm", "-DC", "--defined-only", self.libraries / "libkmax.so")
-        for inside in "kmax::device::", "kmax::firmware::", "kmax::link::", "kmax::cli::", "CLI::", "nlohmann":
+        for inside in "kmax::device::", "kmax::firmware::", "kmax::base::", "kmax::cli::", "CLI::", "nlohmann":
             self.assertNotIn(inside, shown)
 
     def test_one_version(self):

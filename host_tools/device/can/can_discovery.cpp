@@ -11,7 +11,7 @@
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/can/sdo_client.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace canopen = firmware::canopen;
 namespace cob_id = canopen::cob_id;
@@ -161,4 +161,4 @@ std::vector<FoundNode> discover_nodes(const std::string& bus, const CanDiscovery
   return Search(bus, settings).run();
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// A CANopen node that was found on a bus. What it was not asked, or did not answer, is missing.
 struct FoundNode {
@@ -35,4 +35,4 @@ struct CanDiscoverySettings {
 /// Ordered by node ID. Errors: LinkError.
 std::vector<FoundNode> discover_nodes(const std::string& bus, const CanDiscoverySettings& settings = {});
 
-}  // namespace kmax::link
+}  // namespace kmax::device

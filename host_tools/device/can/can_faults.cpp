@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <linux/can/error.h>
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 const char* controller_text(std::uint8_t state) {
@@ -91,4 +91,4 @@ std::string CanFaults::words(const std::string& interface) const {
   return {};  // lost arbitration and counters: no trouble
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

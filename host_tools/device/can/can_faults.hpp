@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// What a CAN controller reports about the bus, in words: the kernel's error frames (linux/can/error.h).
 class CanFaults {
@@ -30,4 +30,4 @@ class CanFaults {
   bool bus_off_ = false;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

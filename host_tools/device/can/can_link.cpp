@@ -10,7 +10,7 @@
 #include "firmware/object_dictionary/special_objects.hpp"
 #include "host_tools/device/parameter.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 using device::Parameter;
 using firmware::SpecialObject;
@@ -224,4 +224,4 @@ std::map<std::string, std::string> CanLink::identify() {
   return texts;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

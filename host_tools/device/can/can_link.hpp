@@ -8,7 +8,7 @@
 #include "host_tools/device/device_address.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// The node ended a transfer with an SDO abort; the message names the object and says why.
 class SdoRefused : public RefusedError {
@@ -74,4 +74,4 @@ class CanLink final : public Link {
   std::uint16_t number_;       ///< as a commander; not 0
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -12,7 +12,7 @@
 
 #include "host_tools/device/can/can_port.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 /// The same for all names of a bus: paths are told apart by what they lead to.
@@ -38,8 +38,8 @@ LockAddress lock_address(const std::string& key) {
   return result;
 }
 
-FileDescriptor make_socket() {
-  return FileDescriptor(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+base::FileDescriptor make_socket() {
+  return base::FileDescriptor(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
 }
 }  // namespace
 
@@ -59,7 +59,7 @@ std::unique_ptr<CanNodeLock> CanNodeLock::try_to_take(const std::string& bus, st
 
 bool CanNodeLock::try_take() {
   const LockAddress address = lock_address(key_);
-  FileDescriptor attempt = make_socket();
+  base::FileDescriptor attempt = make_socket();
   if (bind(attempt.number(), reinterpret_cast<const sockaddr*>(&address.address), address.length) != 0) {
     if (errno == EADDRINUSE) return false;
     throw LinkError(fmt::format("{}: cannot be reserved for this program: {}", name(), std::strerror(errno)));
@@ -75,7 +75,7 @@ std::string CanNodeLock::name() const {
 
 std::string CanNodeLock::words_for_in_use() const {
   const LockAddress address = lock_address(key_);
-  const FileDescriptor question = make_socket();
+  const base::FileDescriptor question = make_socket();
   ucred holder{};
   socklen_t size = sizeof holder;
   std::string who = "another program";
@@ -85,4 +85,4 @@ std::string CanNodeLock::words_for_in_use() const {
   return fmt::format("it is in use by {}; end that one and try again", who);
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -7,7 +7,7 @@
 #include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/exclusive_use.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Exclusive use of the SDO server of one node on one bus, between programs that ask for it: a node has one
 /// server and holds one conversation, and a second client's request ends the first one's transfer (CiA 301,
@@ -34,7 +34,7 @@ class CanNodeLock final : public ExclusiveUse {
   std::string bus_;
   std::uint8_t node_;
   std::string key_;
-  FileDescriptor socket_;
+  base::FileDescriptor socket_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

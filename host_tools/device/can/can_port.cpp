@@ -5,7 +5,7 @@
 #include "host_tools/device/can/socket_can.hpp"
 #include "host_tools/device/can/unix_can.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 can_frame to_kernel(const drivers::CanFrame& frame) {
   can_frame kernel{};
@@ -44,4 +44,4 @@ std::unique_ptr<CanPort> open_can_port(const std::string& name, const CanPortOpt
   return std::make_unique<SocketCan>(name, options);
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

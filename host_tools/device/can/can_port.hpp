@@ -12,7 +12,7 @@
 #include "drivers/can_frame.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// The bus can be used, but there was no room for a frame within CanPortOptions::send_patience.
 class SendQueueFull : public LinkError {
@@ -97,4 +97,4 @@ bool passes(const drivers::CanFrame& frame, const std::vector<CanFilter>& filter
 bool is_socket_path(const std::string& name);
 std::unique_ptr<CanPort> open_can_port(const std::string& name, const CanPortOptions& options = {});
 
-}  // namespace kmax::link
+}  // namespace kmax::device

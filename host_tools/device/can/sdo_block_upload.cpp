@@ -7,7 +7,7 @@
 #include "firmware/canopen/sdo_frame.hpp"
 #include "host_tools/device/can/sdo_client.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace canopen = firmware::canopen;
 namespace sdo_flag = canopen::sdo_flag;
@@ -113,4 +113,4 @@ bool SdoClient::receive_block(Object object, Bytes& bytes, const ReportProgress&
   return last;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -8,7 +8,7 @@
 #include "firmware/canopen/sdo_frame.hpp"
 #include "firmware/object_dictionary/cob_id.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace canopen = firmware::canopen;
 namespace cob_id = canopen::cob_id;
@@ -262,4 +262,4 @@ void SdoClient::download_once(Object object, std::span<const std::uint8_t> value
   } while (!value.empty());
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -14,7 +14,7 @@
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// The node ended the transfer and said why.
 class SdoAborted : public std::runtime_error {
@@ -116,4 +116,4 @@ class SdoClient {
 /// "0x2000:04"
 std::string text_of(firmware::canopen::ObjectAddress object);
 
-}  // namespace kmax::link
+}  // namespace kmax::device

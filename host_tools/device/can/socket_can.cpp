@@ -21,7 +21,7 @@
 #include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 using Clock = std::chrono::steady_clock;
@@ -76,7 +76,7 @@ SocketCan::SocketCan(const std::string& interface, const CanPortOptions& options
 }
 
 void SocketCan::open() {
-  socket_ = FileDescriptor(socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW));
+  socket_ = base::FileDescriptor(socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW));
   if (!socket_) fail("cannot use this interface", errno);
   const unsigned index = interface_.size() < IFNAMSIZ ? if_nametoindex(interface_.c_str()) : 0;
   if (index == 0) throw LinkError(fmt::format("{}: {}", interface_, words_for_missing(interface_)));
@@ -152,7 +152,7 @@ void SocketCan::send(const drivers::CanFrame& frame) {
     waited = true;
     // Room in the socket (POLLOUT) is not room in the interface's queue, which cannot be waited for: a frame
     // takes at least 47 bit times, about 50 us at 1 Mbit/s.
-    wait_for(socket_.number(), POLLOUT, microseconds(1000));
+    base::wait_for(socket_.number(), POLLOUT, microseconds(1000));
     std::this_thread::sleep_for(microseconds(200));
   }
 }
@@ -215,7 +215,7 @@ std::optional<Received> SocketCan::receive(microseconds wait) {
     }
     const auto left = std::chrono::duration_cast<microseconds>(deadline - Clock::now());
     if (left <= microseconds(0)) return std::nullopt;
-    wait_for(socket_.number(), POLLIN, left);
+    base::wait_for(socket_.number(), POLLIN, left);
   }
 }
 
@@ -244,4 +244,4 @@ void SocketCan::fail(const char* doing, int error) const {
   throw LinkError(fmt::format("{}: {}: {}", interface_, doing, words));
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -6,7 +6,7 @@
 
 struct can_frame;
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// A CAN interface of the kernel (SocketCAN, Documentation/networking/can.rst): a raw socket bound to it,
 /// with the kernel's filters and its own time stamps (taken when the frame came in, not when it was read).
@@ -37,11 +37,11 @@ class SocketCan final : public CanPort {
 
   std::string interface_;
   CanPortOptions options_;
-  FileDescriptor socket_;
+  base::FileDescriptor socket_;
   CanFaults faults_;
 };
 
 /// Names of the CAN interfaces of this machine, up or down.
 std::vector<std::string> can_interfaces();
 
-}  // namespace kmax::link
+}  // namespace kmax::device

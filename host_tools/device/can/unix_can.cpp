@@ -11,7 +11,7 @@
 #include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 using Clock = std::chrono::steady_clock;
@@ -73,7 +73,7 @@ void UnixCan::send(const drivers::CanFrame& frame) {
                       path_, options_.send_patience.count()));
     if (!waited) ++counters_.send_waits;
     waited = true;
-    wait_for(socket_.number(), POLLOUT, left);
+    base::wait_for(socket_.number(), POLLOUT, left);
   }
 }
 
@@ -97,7 +97,7 @@ std::optional<Received> UnixCan::receive(microseconds wait) {
     }
     const auto left = std::chrono::duration_cast<microseconds>(deadline - Clock::now());
     if (left <= microseconds(0)) return std::nullopt;
-    wait_for(socket_.number(), POLLIN, left);
+    base::wait_for(socket_.number(), POLLIN, left);
   }
 }
 
@@ -106,4 +106,4 @@ void UnixCan::fail_closed() const {
       "{}: the bus was closed: the program that served it has ended; start it and try again", path_));
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

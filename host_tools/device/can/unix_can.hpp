@@ -3,7 +3,7 @@
 #include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/can/can_port.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// A CAN bus without a kernel that has CAN: a Unix domain socket (SOCK_SEQPACKET) that carries `struct
 /// can_frame`, one in each message, served by a UnixCanHub in `kmax serve` or `kmax-board`.
@@ -25,7 +25,7 @@ class UnixCan final : public CanPort {
 
   std::string path_;
   CanPortOptions options_;
-  FileDescriptor socket_;
+  base::FileDescriptor socket_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

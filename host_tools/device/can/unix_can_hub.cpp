@@ -16,7 +16,7 @@
 #include "host_tools/device/can/can_port.hpp"
 #include "host_tools/device/link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 [[noreturn]] void fail_hub(const std::string& path, const std::string& words) {
@@ -35,7 +35,7 @@ sockaddr_un socket_address(const std::string& path) {
 
 /// Somebody accepts, or could.
 bool is_served(const sockaddr_un& address) {
-  const FileDescriptor probe(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const base::FileDescriptor probe(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   return connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
          errno != ECONNREFUSED;
 }
@@ -63,7 +63,7 @@ unsigned long long inode_at(const std::string& path) {
 
 UnixCanHub::UnixCanHub(const std::string& path) : path_(path) {
   listen_at_path();
-  events_ = FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
+  events_ = base::FileDescriptor(epoll_create1(EPOLL_CLOEXEC));
   if (!events_) fail_hub(path_, fmt::format("cannot serve a CAN bus: {}", std::strerror(errno)));
   watch(events_.number(), listener_.number());
 }
@@ -77,8 +77,9 @@ void UnixCanHub::listen_at_path() {
     fail_hub(path_, fmt::format("cannot make a socket for the CAN bus: {}", std::strerror(errno)));
   };
   const std::filesystem::path parent = std::filesystem::path(path_).parent_path();
-  const FileDescriptor folder(open(parent.empty() ? "." : parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-  listener_ = FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const base::FileDescriptor folder(
+      open(parent.empty() ? "." : parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  listener_ = base::FileDescriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!folder || !listener_) fail();
   const std::string name = fmt::format(".kmax-{}-{}", getpid(), listener_.number());
   // By the folder's descriptor, so that a path of the full length leaves room for the longer name.
@@ -110,7 +111,7 @@ UnixCanHub::~UnixCanHub() {
 
 void UnixCanHub::admit() {
   for (;;) {
-    FileDescriptor client(accept4(listener_.number(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    base::FileDescriptor client(accept4(listener_.number(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!client) return;
     watch(events_.number(), client.number());
     ask_for_room(client.number());
@@ -162,4 +163,4 @@ void UnixCanHub::send(const drivers::CanFrame& frame) {
   deliver(to_kernel(frame), -1);
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

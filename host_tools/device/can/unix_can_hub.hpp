@@ -9,7 +9,7 @@
 
 struct can_frame;
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Serves a CAN bus at a Unix domain socket (unix_can.hpp): what one client sends goes to all others and to
 /// the owner; what the owner sends goes to all clients. Belongs to one thread; frames move only in poll().
@@ -47,7 +47,7 @@ class UnixCanHub {
   const Counters& counters() const { return counters_; }
 
  private:
-  using Clients = std::map<int, FileDescriptor>;
+  using Clients = std::map<int, base::FileDescriptor>;
 
   void listen_at_path();
   void admit();
@@ -56,10 +56,10 @@ class UnixCanHub {
   bool drain(int client, std::vector<drivers::CanFrame>& frames);
 
   std::string path_;
-  FileDescriptor listener_, events_;
+  base::FileDescriptor listener_, events_;
   unsigned long long inode_ = 0;  ///< of the socket, so that nobody else's is removed
   Clients clients_;
   Counters counters_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -5,7 +5,7 @@
 
 #include "firmware/modbus/crc.hpp"
 
-namespace kmax::link::identification {
+namespace kmax::device::identification {
 
 namespace {
 // unit, function, MEI type, read code, conformity, more follows, next object, number of objects
@@ -50,4 +50,4 @@ std::string name_of(std::uint8_t object) {
   return "object_" + std::to_string(object);
 }
 
-}  // namespace kmax::link::identification
+}  // namespace kmax::device::identification

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Read Device Identification (function 43, MEI type 14; MODBUS Application Protocol V1.1b3, 6.21). Frames
 /// are whole RTU frames: unit first, CRC last.
@@ -33,4 +33,4 @@ std::optional<Page> parse(std::span<const std::uint8_t> frame, std::uint8_t unit
 std::string name_of(std::uint8_t object);
 
 }  // namespace identification
-}  // namespace kmax::link
+}  // namespace kmax::device

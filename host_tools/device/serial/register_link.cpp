@@ -11,7 +11,7 @@
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/device/serial/tagged_exchange.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 using device::Parameter;
 using device::Table;
@@ -198,4 +198,4 @@ std::optional<identification::Page> FrameLink::read_identification(std::uint8_t 
                                unit_);
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

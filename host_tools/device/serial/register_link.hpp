@@ -10,7 +10,7 @@
 #include "host_tools/device/link.hpp"
 #include "host_tools/device/serial/identification_reply.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// The device answered with a Modbus exception (MODBUS Application Protocol V1.1b3, section 7).
 class RegisterRefused : public RefusedError {
@@ -103,4 +103,4 @@ class FrameLink : public RegisterLink {
   std::uint8_t unit_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -14,7 +14,7 @@
 #include "firmware/modbus/server.hpp"
 #include "host_tools/device/serial/identification_reply.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 using std::chrono::milliseconds;
@@ -132,4 +132,4 @@ void SerialLink::fail_unanswered(std::span<const std::uint8_t> request, const Un
                   address_.path, address_.unit, address_.baud_rate, asked, tried));
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -10,7 +10,7 @@
 
 struct _modbus;
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Modbus RTU on a serial port or pseudo-terminal, which libmodbus opens, sets up and sends on: 8 data bits,
 /// even parity, 1 stop bit. Every request is tagged, so that no answer is taken for another one's
@@ -57,4 +57,4 @@ class SerialLink final : public FrameLink, private ByteLine {
   TaggedExchange tagged_;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

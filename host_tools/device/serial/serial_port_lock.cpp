@@ -11,7 +11,7 @@
 #include <cerrno>
 #include <cstring>
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 [[noreturn]] void fail_to_open(const std::string& path, int error) {
@@ -52,7 +52,7 @@ SerialPortLock::~SerialPortLock() {
 bool SerialPortLock::try_take() {
   if (!descriptor_) {
     // Non-blocking: without it the open would wait for a modem's carrier.
-    FileDescriptor opened(open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+    base::FileDescriptor opened(open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     if (!opened && errno == EBUSY) return false;  // its holder excludes others
     if (!opened) fail_to_open(path_, errno);
     if (isatty(opened.number()) == 0) throw LinkError(fmt::format("{}: this is not a serial port", path_));
@@ -84,4 +84,4 @@ void SerialPortLock::admit_others() {
   excluding_ = false;
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -5,7 +5,7 @@
 #include "host_tools/base/file_descriptor.hpp"
 #include "host_tools/device/exclusive_use.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// Exclusive use of a serial port between programs that ask for it: flock() on the port itself, so that it
 /// works through any symbolic link and disappears with the process, however that ends.
@@ -33,10 +33,10 @@ class SerialPortLock final : public ExclusiveUse {
   std::string words_for_in_use() const override;
 
   std::string path_;
-  FileDescriptor descriptor_;
+  base::FileDescriptor descriptor_;
   bool pseudo_terminal_ = false;
   bool excluding_ = false;
   bool excluded_before_lending_ = false;
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

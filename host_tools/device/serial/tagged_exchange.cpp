@@ -8,7 +8,7 @@
 #include "firmware/modbus/server.hpp"
 #include "host_tools/device/serial/identification_reply.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 namespace {
 using firmware::modbus::crc_of;
@@ -156,4 +156,4 @@ void TaggedExchange::synchronize(std::uint8_t unit, int attempts) {
   throw Unanswered(attempts, anything, false);
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace kmax::link {
+namespace kmax::device {
 
 void append_word(std::vector<std::uint8_t>& frame, std::uint16_t word);
 /// A Modbus RTU frame out of unit and PDU.
@@ -77,4 +77,4 @@ class TaggedExchange {
   bool outstanding_ = false;  ///< a request or its answer may still be under way
 };
 
-}  // namespace kmax::link
+}  // namespace kmax::device

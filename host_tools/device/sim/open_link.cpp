@@ -7,7 +7,7 @@
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/device/usb_address.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& notice) {
   switch (address.kind) {
@@ -23,4 +23,4 @@ std::unique_ptr<Link> open_link(const DeviceAddress& address, const Notice& noti
   throw AddressError(fmt::format("{}: no such kind of device", text_of(address)));
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -1,6 +1,6 @@
 #include "host_tools/device/sim/sim_link.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 SimLink::SimLink(const simulation::Scene& scene) : FrameLink(0), simulation_(scene) {
   const auto unit = simulation_.board().application().values().whole<"modbus.unit">();
@@ -33,4 +33,4 @@ std::unique_ptr<SimLink> make_sim_link() {
   return std::make_unique<SimLink>(simulated_board::factory_scene());
 }
 
-}  // namespace kmax::link
+}  // namespace kmax::device

@@ -5,7 +5,7 @@
 #include "host_tools/device/serial/register_link.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 
-namespace kmax::link {
+namespace kmax::device {
 
 /// A simulated device in this process, fresh from the factory: it lives as long as the link.
 ///
@@ -32,4 +32,4 @@ class SimLink final : public FrameLink {
 /// With simulated_board::factory_scene().
 std::unique_ptr<SimLink> make_sim_link();
 
-}  // namespace kmax::link
+}  // namespace kmax::device

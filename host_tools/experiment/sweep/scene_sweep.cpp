@@ -17,25 +17,25 @@ namespace kmax::experiment {
 
 namespace {
 [[noreturn]] void fail(const std::string& name, const std::string& what) {
-  throw device::ValueError(fmt::format("{}: {}", name, what));
+  throw base::ValueError(fmt::format("{}: {}", name, what));
 }
 
 double number_of(const SweptSetting& setting, std::string_view text) {
   try {
-    return device::written_number(text, setting.unit, "a number", "a number").value;
-  } catch (const device::ValueError& error) {
+    return base::written_number(text, setting.unit, "a number", "a number").value;
+  } catch (const base::ValueError& error) {
     fail(setting.shown, error.what());
   }
 }
 
 bool has_unit(std::string_view text) {
-  const std::string_view bare = device::trimmed(text);
+  const std::string_view bare = base::trimmed(text);
   return !bare.empty() && std::string_view("0123456789.").find(bare.back()) == std::string_view::npos;
 }
 
 /// What adding steps leaves behind the last digit that anybody wrote.
 std::string without_rounding(double value) {
-  return device::number_text(std::stod(fmt::format("{:.12g}", value)));
+  return base::number_text(std::stod(fmt::format("{:.12g}", value)));
 }
 
 std::vector<std::string> range_of(const SweptSetting& setting, std::string_view text, std::size_t dots) {
@@ -64,9 +64,9 @@ std::vector<std::string> list_of(const SweptSetting& setting, std::string_view t
   std::vector<std::string> values;
   for (std::size_t at = 0; at <= text.size();) {
     const std::size_t comma = std::min(text.find(',', at), text.size());
-    const std::string_view one = device::trimmed(text.substr(at, comma - at));
+    const std::string_view one = base::trimmed(text.substr(at, comma - at));
     if (one.empty()) fail(setting.shown, fmt::format("'{}': a value is missing", text));
-    std::string value = numbers ? device::number_text(number_of(setting, one)) : std::string(one);
+    std::string value = numbers ? base::number_text(number_of(setting, one)) : std::string(one);
     if (std::find(values.begin(), values.end(), value) != values.end())
       fail(setting.shown, fmt::format("'{}': {} is given twice; leave one out (--repeat runs a combination "
                                       "more than once)",
@@ -168,7 +168,7 @@ simulation::Scene SceneSweep::scene_of(std::size_t run) const {
 
 bool check_sweep(const SceneSweep& sweep) {
   if (sweep.points() > sweep_runs_max || sweep.runs() > sweep_runs_max)
-    throw device::ValueError(
+    throw base::ValueError(
         fmt::format("these are more than {} runs; take larger steps or fewer repeats", sweep_runs_max));
   bool noise = false;
   for (std::size_t run = 0; run < sweep.runs(); run += sweep.repeats)

@@ -23,7 +23,7 @@ struct SweptSetting {
 };
 
 /// "NAME=VALUE", "NAME=A,B,C" or "NAME=FROM..TO:STEP", which ends at the last step that does not pass TO.
-/// With a unit at every number or at none. Errors: device::ValueError.
+/// With a unit at every number or at none. Errors: base::ValueError.
 SweptSetting parse_swept_setting(const std::string& text);
 
 struct SceneSweep {
@@ -40,7 +40,7 @@ struct SceneSweep {
 };
 
 /// Opens every point, so that a wrong one is found before anything runs. Returns whether any of them has a
-/// part with noise: without one all repeats are equal. Throws simulation::SceneError, and device::ValueError
+/// part with noise: without one all repeats are equal. Throws simulation::SceneError, and base::ValueError
 /// for more than sweep_runs_max runs.
 bool check_sweep(const SceneSweep& sweep);
 

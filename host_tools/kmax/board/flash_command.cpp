@@ -143,25 +143,25 @@ struct WayIn {
 };
 
 /// What --usb-serial or --device says of which board on USB is meant; nothing where they say nothing.
-std::optional<link::DeviceAddress> meant_board(const Context& context, const FlashOptions& options) {
+std::optional<device::DeviceAddress> meant_board(const Context& context, const FlashOptions& options) {
   if (!options.usb_serial.empty()) {
-    link::DeviceAddress address;
-    address.kind = link::DeviceAddress::Kind::usb;
+    device::DeviceAddress address;
+    address.kind = device::DeviceAddress::Kind::usb;
     address.path = options.usb_serial;
     return address;
   }
   const auto named = context.named_device();
-  return named ? std::optional(link::parse_device_address(*named)) : std::nullopt;
+  return named ? std::optional(device::parse_device_address(*named)) : std::nullopt;
 }
 
 WayIn way_in(const Context& context, const FlashOptions& options, const BoardProfile& board,
              const lines::LinesConfig& config, Method method, std::span<const usb::UsbDevice> devices) {
-  using Kind = link::DeviceAddress::Kind;
+  using Kind = device::DeviceAddress::Kind;
   const bool has_lines = config.find(LineRole::boot0) != nullptr && config.find(LineRole::reset) != nullptr;
   if (method == Method::serial) return {.by_lines = has_lines};
   if (method != Method::dfu) return {};
   const auto meant = meant_board(context, options);
-  const usb::UsbDevice* running = meant ? link::usb_device_of(*meant, devices) : nullptr;
+  const usb::UsbDevice* running = meant ? device::usb_device_of(*meant, devices) : nullptr;
   if (running != nullptr) return {.restarted = *running};
   // In DFU mode a board has another serial number: which one it is, only the port says.
   if (std::ranges::any_of(devices, &usb::UsbDevice::is_dfu)) {
@@ -171,18 +171,18 @@ WayIn way_in(const Context& context, const FlashOptions& options, const BoardPro
     throw flash::MethodError(
         fmt::format("{} is not on USB; is it the board in DFU mode? Then leave --device and KMAX_DEVICE out, "
                     "or name that one by --usb-serial",
-                    link::text_of(*meant)));
+                    device::text_of(*meant)));
   }
   if (has_lines && !board.boot0_is_switch) return {.by_lines = true};
   if (std::ranges::none_of(devices, &usb::UsbDevice::is_kmax)) return {};
   // A device of another link may be the same board; one that USB does not have is another one.
-  link::DeviceAddress only;
+  device::DeviceAddress only;
   only.kind = Kind::usb;
-  if (!meant || meant->kind != Kind::usb) running = link::usb_device_of(only, devices);
+  if (!meant || meant->kind != Kind::usb) running = device::usb_device_of(only, devices);
   if (running == nullptr)
     throw flash::MethodError(
         fmt::format("which board? On USB there is {}; name one by --device or --usb-serial",
-                    link::usb_addresses(devices)));
+                    device::usb_addresses(devices)));
   return {.restarted = *running, .must_be_named = meant.has_value()};
 }
 
@@ -211,7 +211,7 @@ void refuse_while_armed(Context& context, const WayIn& way) {
           "the board of --device has the serial number {:08X}, and the one on USB {}: name the one that is "
           "meant. Nothing was changed",
           number, way.restarted->serial));
-  } catch (const link::LinkError& error) {
+  } catch (const device::LinkError& error) {
     if (way.must_be_named)
       throw flash::FlashError(
           fmt::format("the device that is named does not answer, so it may be another board than {}, the "
@@ -220,7 +220,7 @@ void refuse_while_armed(Context& context, const WayIn& way) {
                       way.restarted->address(), error.what()));
     context.note(fmt::format("the board does not answer, so it was not asked whether an axis is armed: {}",
                              error.what()));
-  } catch (const device::DeviceError& error) {
+  } catch (const base::DeviceError& error) {
     context.note(fmt::format("the board was not asked whether an axis is armed: {}", error.what()));
   }
 }
@@ -287,17 +287,17 @@ int show_plan(Context& context, const BoardProfile& board, Method method, const 
                    {"dry_run", true},
                    {"pieces", pieces},
                    {"commands", commands}});
-    return done;
+    return base::done;
   }
-  print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
-        flash::facts_of(method).name);
-  if (way.by_lines) print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
+  base::print(context.out, "# {} by {}; file names are in a temporary folder\n", board.title,
+              flash::facts_of(method).name);
+  if (way.by_lines) base::print(context.out, "# start the ROM bootloader: [lines.boot0], [lines.reset]\n");
   if (way.restarted)
-    print(context.out, "# start the ROM bootloader: {} restarts\n", way.restarted->address());
+    base::print(context.out, "# start the ROM bootloader: {} restarts\n", way.restarted->address());
   for (const flash::Step& step : steps)
-    print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
-  if (way.by_lines) print(context.out, "# start the application: [lines.reset]\n");
-  return done;
+    base::print(context.out, "# {}\n{}\n", step.says, flash::command_text(step.arguments));
+  if (way.by_lines) base::print(context.out, "# start the application: [lines.reset]\n");
+  return base::done;
 }
 
 /// The start step of a plan that leaves DFU mode. The board vanishes under dfu-util, which may call that an
@@ -323,7 +323,7 @@ bool leave_dfu_mode(Context& context, const BoardServices& services, const WayIn
 bool carry_out(Context& context, const BoardServices& services, const lines::LinesConfig& config,
                Method method, const flash::FlashPlan& plan, const WayIn& way, double at_most,
                const std::function<void(flash::WorkFolder&, const flash::FlashHooks&)>& work) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   refuse_while_armed(context, way);
   flash::WorkFolder folder;
   flash::FlashHooks hooks;
@@ -369,8 +369,8 @@ int run_flash(Context& context, const FlashOptions& options) try {
   const auto verdicts = flash::judge_methods(board, config, devices);
   // Who names a board on USB means that board, and not the one that a debug adapter happens to be at.
   const auto meant = meant_board(context, options);
-  const bool on_usb = meant && (meant->kind == link::DeviceAddress::Kind::usb ||
-                                link::usb_device_of(*meant, devices) != nullptr);
+  const bool on_usb = meant && (meant->kind == device::DeviceAddress::Kind::usb ||
+                                device::usb_device_of(*meant, devices) != nullptr);
   const bool by_usb = on_usb && options.usb_serial.empty() && options.method == "auto";
   const Method method =
       flash::choose_method(by_usb ? "dfu" : options.method, board, verdicts, options.dry_run);
@@ -421,7 +421,7 @@ int run_flash(Context& context, const FlashOptions& options) try {
   if (!started)
     context.note(fmt::format("to start it: {}",
                              way.restarted ? "switch the DC supply off and on" : board.to_application));
-  return done;
+  return base::done;
 } catch (const flash::ImageError& error) {
   throw UsageError(error.what());
 } catch (const flash::MethodNotOnBoardError& error) {

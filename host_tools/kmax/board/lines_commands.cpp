@@ -142,7 +142,7 @@ void require_some(const LinesConfig& config) {
 }
 
 /// End of --for, or never.
-std::function<bool()> until(const LinesOptions& options, const Interruption& interruption) {
+std::function<bool()> until(const LinesOptions& options, const base::Interruption& interruption) {
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                       std::chrono::duration<double>(options.duration));
   const bool limited = options.duration > 0;
@@ -172,23 +172,24 @@ int list_lines(Context& context, const LinesOptions&, const LinesConfig& config)
                           {"state", facts.active ? Json(state) : Json(nullptr)}};
         continue;
       }
-      print(context.out, "{:15} {} line {}{}, {}: {}\n", name, facts.chip, facts.offset,
-            facts.name.empty() ? "" : fmt::format(" \"{}\"", facts.name), facts.output ? "output" : "input",
-            facts.high ? fmt::format("{}, {}", *facts.high ? "high" : "low", state)
-                       : fmt::format("held by {}", facts.consumer));
+      base::print(context.out, "{:15} {} line {}{}, {}: {}\n", name, facts.chip, facts.offset,
+                  facts.name.empty() ? "" : fmt::format(" \"{}\"", facts.name),
+                  facts.output ? "output" : "input",
+                  facts.high ? fmt::format("{}, {}", *facts.high ? "high" : "low", state)
+                             : fmt::format("held by {}", facts.consumer));
     } catch (const lines::LineError& error) {
       // The others are still worth seeing.
       if (!first_error) first_error = std::current_exception();
       if (context.json) {
         document[name] = {{"error", error.what()}};
       } else {
-        print(context.out, "{:15} {}\n", name, error.what());
+        base::print(context.out, "{:15} {}\n", name, error.what());
       }
     }
   }
   if (context.json) context.print(document);
   if (first_error && !context.json) std::rethrow_exception(first_error);
-  return first_error ? failed : done;
+  return first_error ? base::failed : base::done;
 }
 
 LineRole role_of(const std::string& name) {
@@ -218,7 +219,7 @@ int watch_lines(Context& context, const LinesOptions& options, const LinesConfig
   std::vector<lines::LineSettings> settings;
   for (const LineRole role : roles) settings.push_back(config.required(role));
 
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto gpio = board_services(context).open_gpio();
   const auto watch = gpio->watch(settings);
   const auto over = until(options, interruption);
@@ -227,7 +228,8 @@ int watch_lines(Context& context, const LinesOptions& options, const LinesConfig
   for (std::size_t i = 0; i < roles.size(); ++i) {
     const std::string word(lines::state_word(roles[i], states[i]));
     start[std::string(lines::facts_of(roles[i]).name)] = word;
-    if (!context.json) print(context.out, "{:>20}  {:15} {}\n", "now", lines::facts_of(roles[i]).name, word);
+    if (!context.json)
+      base::print(context.out, "{:>20}  {:15} {}\n", "now", lines::facts_of(roles[i]).name, word);
   }
   context.out.flush();
   // The wait ends at an edge; its limit is only for the end of the whole.
@@ -239,13 +241,13 @@ int watch_lines(Context& context, const LinesOptions& options, const LinesConfig
         edges.push_back(
             {{"line", name}, {"state", word}, {"active", edge.active}, {"time_ns", edge.time.count()}});
       } else {
-        print(context.out, "{:>20}  {:15} {}\n", seconds_text(edge.time), name, word);
+        base::print(context.out, "{:>20}  {:15} {}\n", seconds_text(edge.time), name, word);
       }
     }
     context.out.flush();
   }
   if (context.json) context.print({{"start", start}, {"edges", edges}});
-  return done;
+  return base::done;
 }
 
 struct LineAssignment {
@@ -281,7 +283,7 @@ int set_lines(Context& context, const LinesOptions& options, const LinesConfig& 
     config.required(one.role);
     assignments.push_back(one);
   }
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto gpio = board_services(context).open_gpio();
   HeldLines held(context, *gpio);
   Json document = Json::object();
@@ -289,7 +291,7 @@ int set_lines(Context& context, const LinesOptions& options, const LinesConfig& 
     held.drive(config.required(role), role, active);
     const std::string name(lines::facts_of(role).name), word(lines::state_word(role, active));
     document[name] = word;
-    if (!context.json) print(context.out, "{} = {}\n", name, word);
+    if (!context.json) base::print(context.out, "{} = {}\n", name, word);
   }
   context.out.flush();
   if (std::ranges::any_of(assignments, [](const auto& one) { return one.role == LineRole::emergency_stop; }))
@@ -303,21 +305,21 @@ int set_lines(Context& context, const LinesOptions& options, const LinesConfig& 
   while (!over()) board_services(context).sleep(milliseconds(20));
   held.end();
   if (context.json) context.print(document);
-  return done;
+  return base::done;
 }
 
 int run_reset(Context& context, const LinesOptions&, const LinesConfig& config) {
   config.required(LineRole::reset);
   // A reset that is torn would leave the board in it.
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto gpio = board_services(context).open_gpio();
   lines::pulse_reset(*gpio, config, board_services(context).sleep);
   if (context.json) {
     context.print({{"reset", true}});
   } else {
-    print(context.out, "the board was reset\n");
+    base::print(context.out, "the board was reset\n");
   }
-  return done;
+  return base::done;
 }
 
 int run_bootloader(Context& context, const LinesOptions& options, const LinesConfig& config) {
@@ -327,15 +329,15 @@ int run_bootloader(Context& context, const LinesOptions& options, const LinesCon
         "BOOT0 of {} is a switch that no line can move. To start the ROM bootloader: {}. To go back: {}",
         board.title, board.to_bootloader, board.to_application));
   // Likewise.
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto gpio = board_services(context).open_gpio();
   lines::enter_bootloader(*gpio, config, board_services(context).sleep);
   if (context.json) {
     context.print({{"bootloader", true}});
   } else {
-    print(context.out, "the ROM bootloader runs until the next reset ('kmax reset')\n");
+    base::print(context.out, "the ROM bootloader runs until the next reset ('kmax reset')\n");
   }
-  return done;
+  return base::done;
 }
 
 }  // namespace

@@ -252,8 +252,8 @@ Json document(const DesignTask& task, const WallDesign& design,
 void print_design(Context& context, const DesignTask& task, const WallDesign& design) {
   if (design.found) {
     for (const device::Assignment& one : experiment::parameters_of(task, design.wall))
-      print(context.out, "{} = {}\n", one.parameter.name(), value_with_unit(one.parameter, one.raw));
-    print(context.out, "\n");
+      base::print(context.out, "{} = {}\n", one.parameter.name(), value_with_unit(one.parameter, one.raw));
+    base::print(context.out, "\n");
   }
   for (const std::string& words : experiment::wall_design_words(task, design)) context.say(words, 2);
 }
@@ -271,12 +271,12 @@ int run_share(Context& context, const DesignWallOptions& options, const DesignTa
   if (context.json)
     context.print({{"journal", file.string()}, {"part", share.part}, {"of", share.of}});
   else
-    print(context.out, "{}\n", file.string());
-  return done;
+    base::print(context.out, "{}\n", file.string());
+  return base::done;
 }
 
 int run_design_wall(Context& context, const DesignWallOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   if (!options.shard.empty() && !options.merge.empty())
     throw UsageError("--shard makes a share and --merge finishes from all: leave one of them out");
   DesignTask task;
@@ -288,7 +288,7 @@ int run_design_wall(Context& context, const DesignWallOptions& options) {
     throw UsageError(fmt::format("--subjects {}", error.what()));
   }
   if (!options.save.empty()) base::check_writable(options.save);
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   experiment::DesignRun run{options.jobs, [&](std::size_t done_jobs, std::size_t all) {
                               if (interruption.requested()) throw ExperimentInterrupted("interrupted");
                               progress.show(fmt::format("{} of {} searches", done_jobs, all));
@@ -319,7 +319,7 @@ int run_design_wall(Context& context, const DesignWallOptions& options) {
     print_design(context, task, design);
     print_names(context.out, files);
   }
-  return design.found ? done : verdict_is_no;
+  return design.found ? base::done : base::verdict_is_no;
 }
 
 void add_design_wall_command(CLI::App& design, Context& context) {

@@ -76,7 +76,7 @@ std::string range_text(const MeasuredValue& value) {
 void print_result(Context& context, const bring_up::Report& before, std::size_t axis,
                   const StageResult& result) {
   for (const CheckResult& check : result.checks) {
-    print(context.out, "  {:<22} {}\n", check.name, selftest::name_of(check.verdict));
+    base::print(context.out, "  {:<22} {}\n", check.name, selftest::name_of(check.verdict));
     if (check.verdict != selftest::Verdict::pass) context.say("    " + check.message, 4);
     for (const MeasuredValue& value : check.values) {
       const auto was = before.number(axis, result.stage, check.name, value.name);
@@ -98,22 +98,22 @@ int list_stages(Context& context) {
                       {"connect", std::string(text.connect)},
                       {"does", std::string(text.does)}});
     context.print({{"stages", list}});
-    return done;
+    return base::done;
   }
   for (const StageText& text : bring_up::all_stages()) {
     context.say(fmt::format("{}: {}", text.name, text.title));
     context.say(fmt::format("  connect: {}", text.connect), 4);
     context.say(fmt::format("  does: {}", text.does), 4);
   }
-  return done;
+  return base::done;
 }
 
 /// Before there is a device, nothing but its link can be wrong.
 device::Device connect_or_advise(Context& context) {
   try {
     return context.connect_to_change();
-  } catch (const link::LinkError& error) {
-    throw link::LinkError(
+  } catch (const device::LinkError& error) {
+    throw device::LinkError(
         fmt::format("stage 'logic': {}. PWR must be green (motor supply on); serial line: 3.3 V adapter, RXD "
                     "to GPIO3 and TXD to GPIO4, 8E1 (even parity); CAN: H, L and ground on J3, 120 ohm at "
                     "both ends; SW1 on RUN, and the firmware written ('kmax flash')",
@@ -123,7 +123,7 @@ device::Device connect_or_advise(Context& context) {
 
 int run_bring_up(Context& context, const BringUpOptions& options) {
   if (options.list) return list_stages(context);
-  const Interruption interruption;
+  const base::Interruption interruption;
   bring_up::Settings settings = options.settings;
   settings.axis = context.axis();
   settings.has_button = !options.no_button;
@@ -141,7 +141,7 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
     if (interruption.requested()) throw bench::Interrupted("interrupted; 'kmax bring-up' goes on from here");
   };
   TerminalPrompter terminal(context, check, "somebody must be at the board; --yes asks nothing");
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   StagePrompter prompter(options.yes ? nullptr : &terminal);
   const auto keep = [&file](const bring_up::Report& now) { base::write_file(file, now.text()); };
   const bring_up::Party party{prompter,
@@ -156,8 +156,8 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
                               [&](const StageResult& result) {
                                 if (context.json) return;
                                 progress.make_room();
-                                print(context.out, "{}: {}\n", bring_up::text_of(result.stage).name,
-                                      result.passed() ? "passed" : "FAILED");
+                                base::print(context.out, "{}: {}\n", bring_up::text_of(result.stage).name,
+                                            result.passed() ? "passed" : "FAILED");
                                 print_result(context, before, settings.axis, result);
                               }};
   bool passed = false;
@@ -180,7 +180,7 @@ int run_bring_up(Context& context, const BringUpOptions& options) {
              : "all stages have passed; 'kmax save' keeps wall.stiffness. Positions count from each start: "
                "then 'kmax set wall.position=here-5mm'"));
   }
-  return passed ? done : verdict_is_no;
+  return passed ? base::done : base::verdict_is_no;
 }
 }  // namespace
 

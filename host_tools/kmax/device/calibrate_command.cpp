@@ -76,10 +76,10 @@ Json step_json(const StepReport& step) {
 }
 
 void print_step(Context& context, const StepReport& step) {
-  print(context.out, "{}: {}\n", step.name,
-        step.pass      ? "done"
-        : step.skipped ? "left out, a step before it has failed"
-                       : "FAILED");
+  base::print(context.out, "{}: {}\n", step.name,
+              step.pass      ? "done"
+              : step.skipped ? "left out, a step before it has failed"
+                             : "FAILED");
   for (const IdentifiedValue& value : step.values)
     context.say(fmt::format("  {:<27} {:>12.5g} +- {:<8.2g} {:<7} {}", value.name, value.value, value.spread,
                             value.unit, value.previous ? fmt::format("was {:.5g}", *value.previous) : ""),
@@ -94,13 +94,13 @@ void print_step(Context& context, const StepReport& step) {
 void print_report(Context& context, const CalibrateOptions& options, const CalibrationReport& report) {
   for (const StepReport& step : report.steps) print_step(context, step);
   if (report.stored) {
-    print(context.out, "saved\n");
+    base::print(context.out, "saved\n");
   } else if (report.kept) {
-    print(context.out, "kept until the next restart; 'kmax save' keeps it for good\n");
+    base::print(context.out, "kept until the next restart; 'kmax save' keeps it for good\n");
   } else if (options.settings.dry_run && report.pass()) {
-    print(context.out, "dry run: all parameters are as before\n");
+    base::print(context.out, "dry run: all parameters are as before\n");
   } else {
-    print(context.out, "nothing was kept: all parameters are as before\n");
+    base::print(context.out, "nothing was kept: all parameters are as before\n");
   }
 }
 
@@ -112,7 +112,7 @@ std::string rough(std::chrono::seconds time) {
 }
 
 int run_calibrate(Context& context, const CalibrateOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   CalibrationSettings settings = options.settings;
   settings.axis = context.axis();
   settings.save = !options.no_save;
@@ -125,7 +125,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   TerminalPrompter prompter(context, check_interruption, "--hand needs somebody at the terminal");
   CalibrationReport report;
   {
-    Progress progress(context.messages());
+    base::Progress progress(context.messages());
     const auto show = [&](const std::string& text) {
       check_interruption();
       if (!text.empty()) progress.show(text);
@@ -150,7 +150,7 @@ int run_calibrate(Context& context, const CalibrateOptions& options) {
   } else {
     print_report(context, options, report);
   }
-  return report.pass() ? done : verdict_is_no;
+  return report.pass() ? base::done : base::verdict_is_no;
 }
 }  // namespace
 

@@ -35,15 +35,15 @@ int run_devices(Context& context, const DevicesOptions& options) {
   append(devices, usb_devices(on_usb, services.dev, services.may_open));
   append(devices, serial_ports(services.dev, on_usb));
   append(devices, can_interfaces(services.net, on_usb));
-  int code = done;
+  int code = base::done;
   for (const std::string& bus : buses) {
     std::vector<ReachableDevice> nodes;
     try {
-      nodes = nodes_on(bus, link::discover_nodes(bus));
-    } catch (const link::LinkError& error) {
+      nodes = nodes_on(bus, device::discover_nodes(bus));
+    } catch (const device::LinkError& error) {
       // What else can be reached is still worth seeing.
       context.note(error.what());
-      code = failed;
+      code = base::failed;
       continue;
     }
     if (nodes.empty())

@@ -19,8 +19,8 @@
 
 namespace kmax::cli {
 
+using base::DeviceError;
 using device::Device;
-using device::DeviceError;
 using device::Drive;
 using device::DriveStatus;
 using firmware::AxisPresence;
@@ -68,7 +68,7 @@ int print_states(Context& context, Device& device, const std::vector<std::size_t
     }
   }
   if (context.json) context.print({{"axes", list}});
-  return done;
+  return base::done;
 }
 
 int run_state(Context& context) {
@@ -104,7 +104,8 @@ void disarm_after_failure(Context& context, Drive& drive, double link_timeout) {
 }
 
 /// Keeps talking to the device until the user interrupts or the axis loses its force.
-void hold(Context& context, Device& device, Drive& drive, double timeout, const Interruption& interruption) {
+void hold(Context& context, Device& device, Drive& drive, double timeout,
+          const base::Interruption& interruption) {
   const auto interval = timeout > 0
                             ? std::min(milliseconds(200), milliseconds(static_cast<int>(timeout * 250)))
                             : milliseconds(200);
@@ -131,7 +132,7 @@ void note_what_ends_the_force(Context& context, double link_timeout) {
     context.note(fmt::format(
         "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps "
         "it alive",
-        device::number_text(static_cast<float>(link_timeout))));
+        base::number_text(static_cast<float>(link_timeout))));
   if (link_timeout == 0)
     context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");
 }
@@ -153,7 +154,7 @@ struct ArmOptions {
 
 int run_arm(Context& context, const ArmOptions& options) {
   const bool holding = options.holding;
-  const Interruption interruption;
+  const base::Interruption interruption;
   Device device = context.connect_to_change();
   Drive drive(device, context.axis());
   const double timeout = device.read_number("link.timeout");
@@ -174,7 +175,7 @@ int run_arm(Context& context, const ArmOptions& options) {
     disarm_after_failure(context, drive, timeout);
     throw;
   }
-  return done;
+  return base::done;
 }
 
 int run_disarm(Context& context) {

@@ -13,8 +13,8 @@
 
 namespace kmax::cli {
 
+using base::number_text;
 using device::number_of;
-using device::number_text;
 using firmware::FaultText;
 using firmware::LogEntry;
 using firmware::LogEvent;
@@ -90,7 +90,7 @@ Json entry_json(const LogEntry& entry) {
   for (std::size_t i = 0; i < std::size(number_texts); ++i) {
     const bool known = number_texts[i].unit != nullptr || !unit_of(entry).empty();
     json[number_texts[i].key] =
-        known ? Json(device::shortest_double(number_of(entry, static_cast<TripNumber>(i)))) : Json(nullptr);
+        known ? Json(base::shortest_double(number_of(entry, static_cast<TripNumber>(i)))) : Json(nullptr);
   }
   return json;
 }
@@ -102,7 +102,7 @@ void print_table(Context& context, const std::vector<LogEntry>& entries) {
   }
   const auto row = [&context](const auto&... cells) {
     const std::string line = fmt::format("{:>5} {:>5} {:>14}  {:<4}  {:<22} {:<12} {}", cells...);
-    print(context.out, "{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+    base::print(context.out, "{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
   };
   row("no.", "start", "time in it", "axis", "what", "value", "bound");
   for (const LogEntry& entry : entries) {
@@ -112,8 +112,8 @@ void print_table(Context& context, const std::vector<LogEntry>& entries) {
         device::name_of(entry), trip ? judged_text(entry, TripNumber::value) : times,
         judged_text(entry, TripNumber::bound));
   }
-  print(context.out, "'kmax faults {}' shows all that is known of entry {}\n", entries.front().number,
-        entries.front().number);
+  base::print(context.out, "'kmax faults {}' shows all that is known of entry {}\n", entries.front().number,
+              entries.front().number);
 }
 
 void print_entry(Context& context, const LogEntry& entry) {
@@ -151,9 +151,9 @@ int run_faults(Context& context, const FaultsOptions& options) {
     device::erase_fault_log(device);
     if (context.json) context.print({{"erased", entries.size()}});
     if (!context.json)
-      print(context.out, "erased {} of the fault log\n",
-            entries.size() == 1 ? "1 entry" : fmt::format("{} entries", entries.size()));
-    return done;
+      base::print(context.out, "erased {} of the fault log\n",
+                  entries.size() == 1 ? "1 entry" : fmt::format("{} entries", entries.size()));
+    return base::done;
   }
   auto shown = entries;
   if (options.number) {
@@ -173,7 +173,7 @@ int run_faults(Context& context, const FaultsOptions& options) {
   } else {
     print_table(context, shown);
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

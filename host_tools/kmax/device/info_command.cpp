@@ -104,7 +104,7 @@ int run_info(Context& context) {
     document["lock"] = lock_json(lock);
     document["axes"] = presences;
     context.print(document);
-    return done;
+    return base::done;
   }
 
   const auto line = [&context](std::string name, const std::string& text) {
@@ -129,7 +129,7 @@ int run_info(Context& context) {
     const std::string_view name = parameters[i].definition().name;
     line(std::string(name.substr(name.find('.') + 1)), reading_text(parameters[i], raw[i]));
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

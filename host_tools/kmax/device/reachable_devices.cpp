@@ -46,7 +46,7 @@ std::string state_words(std::uint8_t state) {
   return fmt::format("state {}", state);
 }
 
-bool is_kmax(const link::FoundNode& node) {
+bool is_kmax(const device::FoundNode& node) {
   return node.device_type == firmware::device_type_of_several_axes && node.identity &&
          (*node.identity)[1] == firmware::product_code;
 }
@@ -86,7 +86,7 @@ std::vector<ReachableDevice> serial_ports(const fs::path& dev, std::span<const u
   std::map<fs::path, bool> listed;
   const auto owner = [devices](const fs::path& port) -> std::string {
     const auto* const device =
-        link::usb_device_of({.kind = link::DeviceAddress::Kind::serial, .path = port.string()}, devices);
+        device::usb_device_of({.kind = device::DeviceAddress::Kind::serial, .path = port.string()}, devices);
     return device == nullptr ? "" : ", of " + device->address();
   };
   for (const fs::path& link : entries_of(dev / "serial" / "by-id")) {
@@ -113,22 +113,22 @@ std::vector<ReachableDevice> can_interfaces(const fs::path& net, std::span<const
     const bool up = !flags.empty() && (std::strtoul(flags.c_str(), nullptr, 16) & 1U) != 0;
     std::string text = "CAN interface";
     if (const auto* const device =
-            link::usb_device_of({.kind = link::DeviceAddress::Kind::can, .path = name}, devices))
+            device::usb_device_of({.kind = device::DeviceAddress::Kind::can, .path = name}, devices))
       text += fmt::format(" of {}, {}", device->address(),
                           device->can.front() == name ? "the board alone" : "with the bus at its connector");
     text += up ? fmt::format(", up; 'kmax devices --can {}' looks for nodes on it", name)
                : fmt::format(", down: sudo ip link set {} up type can bitrate {}", name,
-                             link::factory_default<std::uint32_t, "can.bit_rate">());
+                             device::factory_default<std::uint32_t, "can.bit_rate">());
     interfaces.push_back({"can:" + name, text});
   }
   return interfaces;
 }
 
-std::vector<ReachableDevice> nodes_on(const std::string& bus, const std::vector<link::FoundNode>& nodes) {
+std::vector<ReachableDevice> nodes_on(const std::string& bus, const std::vector<device::FoundNode>& nodes) {
   std::vector<ReachableDevice> devices;
-  for (const link::FoundNode& node : nodes) {
-    link::DeviceAddress address;
-    address.kind = link::DeviceAddress::Kind::can;
+  for (const device::FoundNode& node : nodes) {
+    device::DeviceAddress address;
+    address.kind = device::DeviceAddress::Kind::can;
     address.path = bus;
     address.node = node.node;
     std::string text = node.name.empty() ? "unnamed" : node.name;
@@ -142,7 +142,7 @@ std::vector<ReachableDevice> nodes_on(const std::string& bus, const std::vector<
     if (node.state) text += ", " + state_words(*node.state);
     const bool may_be_kmax = is_kmax(node) || node.in_use;
     if (!may_be_kmax) text = fmt::format("node {} on {}: not a Kmax device: ", node.node, bus) + text;
-    devices.push_back({may_be_kmax ? link::text_of(address) : "", text});
+    devices.push_back({may_be_kmax ? device::text_of(address) : "", text});
   }
   return devices;
 }

@@ -33,6 +33,6 @@ std::vector<ReachableDevice> can_interfaces(const std::filesystem::path& net,
                                             std::span<const usb::UsbDevice> devices = {});
 
 /// The nodes on a bus as devices: those that are Kmax controllers have an address.
-std::vector<ReachableDevice> nodes_on(const std::string& bus, const std::vector<link::FoundNode>& nodes);
+std::vector<ReachableDevice> nodes_on(const std::string& bus, const std::vector<device::FoundNode>& nodes);
 
 }  // namespace kmax::cli

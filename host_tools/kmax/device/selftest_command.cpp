@@ -65,19 +65,19 @@ void print_table(Context& context, const selftest::Report& report) {
   constexpr std::size_t name_width = 23, verdict_width = 11, indent = name_width + verdict_width;
   const std::size_t width = context.columns();
   if (report.fault_at_start)
-    print(context.out, "{:<{}}{}\n", "fault before the test", indent,
-          wrapped(fmt::format("{} ({})", report.fault_at_start->words,
-                              report.fault_at_start->cleared ? "cleared" : "its cause remains"),
-                  width - indent, indent));
+    base::print(context.out, "{:<{}}{}\n", "fault before the test", indent,
+                base::wrapped(fmt::format("{} ({})", report.fault_at_start->words,
+                                          report.fault_at_start->cleared ? "cleared" : "its cause remains"),
+                              width - indent, indent));
   for (const selftest::CheckResult& check : report.checks)
-    print(context.out, "{:<{}}{:<{}}{}\n", check.name, name_width, selftest::name_of(check.verdict),
-          verdict_width, wrapped(check.message, width - indent, indent));
-  print(context.out, "The handle was moved by {:.2f} mm at most, by its encoder.\n{}\n",
-        report.largest_displacement * 1e3, selftest::conclusion(report));
+    base::print(context.out, "{:<{}}{:<{}}{}\n", check.name, name_width, selftest::name_of(check.verdict),
+                verdict_width, base::wrapped(check.message, width - indent, indent));
+  base::print(context.out, "The handle was moved by {:.2f} mm at most, by its encoder.\n{}\n",
+              report.largest_displacement * 1e3, selftest::conclusion(report));
 }
 
 int run_selftest_command(Context& context, const SelfTestOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   device::Device device = context.connect_to_change();
   selftest::SelfTestSettings settings;
   settings.axis = context.axis();
@@ -89,7 +89,7 @@ int run_selftest_command(Context& context, const SelfTestOptions& options) {
   }
   selftest::Report report;
   {
-    Progress progress(context.messages());
+    base::Progress progress(context.messages());
     report = selftest::run_selftest(device, settings, [&](const std::string& text) {
       if (interruption.requested()) throw bench::Interrupted("interrupted");
       if (!text.empty()) progress.show(text);
@@ -100,7 +100,7 @@ int run_selftest_command(Context& context, const SelfTestOptions& options) {
   } else {
     print_table(context, report);
   }
-  return report.pass() ? done : verdict_is_no;
+  return report.pass() ? base::done : base::verdict_is_no;
 }
 }  // namespace
 

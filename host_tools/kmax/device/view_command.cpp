@@ -37,20 +37,20 @@ struct ViewOptions {
 };
 
 view::Reach reach_of(Context& context) {
-  const link::DeviceAddress address = link::parse_device_address(context.device_address());
+  const device::DeviceAddress address = device::parse_device_address(context.device_address());
   view::Reach reach{.address = context.device_address(),
                     .open_link = [&context] { return context.open_link(); }};
-  reach.own_time = address.kind == link::DeviceAddress::Kind::sim;
-  if (address.kind != link::DeviceAddress::Kind::can) return reach;
+  reach.own_time = address.kind == device::DeviceAddress::Kind::sim;
+  if (address.kind != device::DeviceAddress::Kind::can) return reach;
   reach.node = address.node;
-  reach.open_bus = [&context, path = address.path](const link::CanPortOptions& options) {
+  reach.open_bus = [&context, path = address.path](const device::CanPortOptions& options) {
     return context.open_bus(path, options);
   };
   return reach;
 }
 
 int run_view(Context& context, const ViewOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   const std::string token = view::make_token();
   view::CommandQueue commands;
   view::WebServer server({.port = options.port, .token = token}, commands, view::page_files());
@@ -67,14 +67,14 @@ int run_view(Context& context, const ViewOptions& options) {
                    {"device", context.device_address()},
                    {"plots", view::page_has_plots()}});
   } else {
-    print(context.out, "{}#{}\n", address, token);
+    base::print(context.out, "{}#{}\n", address, token);
     context.say("open that in a browser on this computer; Ctrl-C ends, and disarms what the page armed", 0);
   }
   context.out.flush();
   if (!view::page_has_plots())
     context.note("this program was built without uPlot: the page shows values in place of its scope");
   session.run([&] { return interruption.requested(); });
-  return done;
+  return base::done;
 }
 }  // namespace
 

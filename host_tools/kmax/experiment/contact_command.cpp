@@ -66,7 +66,7 @@ device::Device connect(Context& context, const experiment::TouchChanges& changes
 }
 
 int run_contact_experiment(Context& context, const ContactOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   experiment::ContactSettings settings = options.settings;
   using experiment::Touching;
   change_touches(
@@ -131,8 +131,10 @@ int run_contact_experiment(Context& context, const ContactOptions& options) {
                    {"files", names_json(files)}});
     return verdict;
   }
-  for (const std::string& line : words) print(context.out, "{}\n", wrapped(line, context.width()));
-  print(context.out, "\n{}", report::terminal_text(experiment::contact_table(results), context.width()));
+  for (const std::string& line : words)
+    base::print(context.out, "{}\n", base::wrapped(line, context.width()));
+  base::print(context.out, "\n{}",
+              report::terminal_text(experiment::contact_table(results), context.width()));
   print_names(context.out, files);
   for (const auto& result : results) {
     if (result.lost_records > 0)

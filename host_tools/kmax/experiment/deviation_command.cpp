@@ -41,7 +41,7 @@ struct DeviationOptions : StudyOptions {
 };
 
 experiment::DeviationStudy simulate(Context& context, const DeviationOptions& options,
-                                    const Interruption& interruption,
+                                    const base::Interruption& interruption,
                                     experiment::Provenance& /*provenance*/) {
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
@@ -52,7 +52,8 @@ experiment::DeviationStudy simulate(Context& context, const DeviationOptions& op
 }
 
 experiment::DeviationStudy measure(Context& context, const DeviationOptions& options,
-                                   const Interruption& interruption, experiment::Provenance& provenance) {
+                                   const base::Interruption& interruption,
+                                   experiment::Provenance& provenance) {
   return measure_study(context, interruption, "deviation", options.settings, options, provenance,
                        experiment::RigAxes::wall_along,
                        [&](experiment::DeviceRig& rig) { return study_deviation(rig, options.settings); });

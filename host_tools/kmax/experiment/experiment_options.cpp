@@ -71,7 +71,7 @@ Json names_json(const std::vector<std::filesystem::path>& written) {
 }
 
 void print_names(std::ostream& out, const std::vector<std::filesystem::path>& written) {
-  for (const auto& file : written) print(out, "{}\n", file.string());
+  for (const auto& file : written) base::print(out, "{}\n", file.string());
 }
 
 void add_subjects_option(CLI::App& command, std::string& people) {
@@ -111,7 +111,7 @@ std::vector<simulation::OperatorModel> people_of(const PeopleOptions& options,
 }
 
 device::Device simulated_device(Context& context, const simulation::Scene& scene) {
-  return device::Device(std::make_unique<link::SimLink>(scene),
+  return device::Device(std::make_unique<device::SimLink>(scene),
                         [&context](const std::string& text) { context.note(text); });
 }
 
@@ -120,7 +120,7 @@ void add_expect_paper_option(CLI::App& command, bool& expect) {
 }
 
 int paper_exit_code(bool expect, bool as_paper) {
-  return expect && !as_paper ? verdict_is_no : done;
+  return expect && !as_paper ? base::verdict_is_no : base::done;
 }
 
 void add_touch_settings_option(CLI::App& command, std::vector<std::string>& settings) {

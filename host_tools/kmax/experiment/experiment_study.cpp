@@ -80,9 +80,9 @@ int print_study(Context& context, StudyReport study, const std::vector<std::file
     context.print(study.document);
   } else {
     for (const std::string& words : study.paragraphs)
-      print(context.out, "{}\n\n", wrapped(words, context.width()));
+      base::print(context.out, "{}\n\n", base::wrapped(words, context.width()));
     for (const report::Table& table : study.tables)
-      print(context.out, "{}\n", report::terminal_text(table, context.width()));
+      base::print(context.out, "{}\n", report::terminal_text(table, context.width()));
     print_names(context.out, files);
   }
   return paper_exit_code(expect_paper, study.claim_met);

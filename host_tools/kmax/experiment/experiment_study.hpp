@@ -75,7 +75,7 @@ Json document_of(const Study& study) {
 template <typename Study, typename Options>
 struct StudyCommand {
   /// Adds to the provenance what was touched.
-  using Make = Study (*)(Context& context, const Options& options, const Interruption& interruption,
+  using Make = Study (*)(Context& context, const Options& options, const base::Interruption& interruption,
                          experiment::Provenance& provenance);
   Make simulate, measure;
   std::vector<std::filesystem::path> (*write)(const Study& study, const experiment::Provenance& provenance,
@@ -96,7 +96,7 @@ int run_study(Context& context, const Options& options, const StudyCommand<Study
   } else {
     require_none(options.simulated->get_options(), for_simulated_people);
   }
-  const Interruption interruption;
+  const base::Interruption interruption;
   make_folder(options.files);
   experiment::Provenance provenance = provenance_of(options.files);
   const Study study =
@@ -113,9 +113,9 @@ inline constexpr auto interrupted_study = "interrupted; nothing is armed";
 /// The study that `make` makes with simulated people: called with the report of its progress, which `words`
 /// puts into a line, and which throws ExperimentInterrupted on Ctrl-C. UsageError for settings it refuses.
 template <typename Make>
-auto simulate_study(Context& context, const Interruption& interruption,
+auto simulate_study(Context& context, const base::Interruption& interruption,
                     std::string (*words)(std::size_t done, std::size_t all), const Make& make) {
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   try {
     return make([&](std::size_t done, std::size_t all) {
       if (interruption.requested()) throw ExperimentInterrupted(interrupted_study);
@@ -142,7 +142,7 @@ struct TouchRun {
 /// What `make` makes of the touches on `device`. Ctrl-C is an ExperimentInterrupted. Errors: those of the rig
 /// and of `make`.
 template <typename Make>
-auto make_touches(Context& context, device::Device& device, const Interruption& interruption,
+auto make_touches(Context& context, device::Device& device, const base::Interruption& interruption,
                   const TouchRun& run, const Make& make) {
   experiment::TouchLimits limits = run.limits;
   limits.axis = context.axis();
@@ -152,7 +152,7 @@ auto make_touches(Context& context, device::Device& device, const Interruption& 
                                 (run.journal != nullptr ? "; --resume goes on" : ""));
   };
   TerminalPrompter prompter(context, check_interruption, experiment_prompt_advice);
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   const experiment::ReportText show = [&](const std::string& text) {
     check_interruption();
     progress.show(run.so_far ? run.so_far() + text : text);
@@ -187,7 +187,7 @@ auto make_touches(Context& context, device::Device& device, const Interruption& 
 /// The study that `make` makes on the device in use, kept in the journal `name` in --out. Errors: those of
 /// open_touch_journal() and of make_touches().
 template <typename Settings, typename Make>
-auto measure_study(Context& context, const Interruption& interruption, const std::string& name,
+auto measure_study(Context& context, const base::Interruption& interruption, const std::string& name,
                    const Settings& settings, const StudyOptions& options, experiment::Provenance& provenance,
                    experiment::RigAxes axes, const Make& make) {
   experiment::TouchLimits limits = options.limits;

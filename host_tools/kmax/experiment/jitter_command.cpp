@@ -41,7 +41,8 @@ struct JitterOptions : StudyOptions {
 };
 
 experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
-                                 const Interruption& interruption, experiment::Provenance& /*provenance*/) {
+                                 const base::Interruption& interruption,
+                                 experiment::Provenance& /*provenance*/) {
   experiment::SimulatedHands hands = options.hands;
   const auto people = people_of(options.people, hands.device);
   return simulate_study(context, interruption, force_pairs_words,
@@ -51,7 +52,7 @@ experiment::JitterStudy simulate(Context& context, const JitterOptions& options,
 }
 
 experiment::JitterStudy measure(Context& context, const JitterOptions& options,
-                                const Interruption& interruption, experiment::Provenance& provenance) {
+                                const base::Interruption& interruption, experiment::Provenance& provenance) {
   return measure_study(context, interruption, "jitter", options.settings, options, provenance,
                        experiment::RigAxes::wall,
                        [&](experiment::DeviceRig& rig) { return study_jitter(rig, options.settings); });

@@ -116,7 +116,7 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
 namespace {
 int run_max_stiffness(Context& context, const MaxStiffnessOptions& given) {
   require_folder_to_resume(given.files.folder, given.resume);
-  const Interruption interruption;
+  const base::Interruption interruption;
   MaxStiffnessOptions options = given;
   using experiment::Touching;
   options.changes =

@@ -30,14 +30,14 @@ void print_results(Context& context, const std::vector<DeviceStiffnessResult>& r
     return;
   }
   for (const std::string& line : words) context.say(line, 0);
-  print(context.out, "\n{}",
-        report::terminal_text(experiment::device_stiffness_table(results), context.width()));
+  base::print(context.out, "\n{}",
+              report::terminal_text(experiment::device_stiffness_table(results), context.width()));
   print_names(context.out, files);
 }
 }  // namespace
 
 int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& options,
-                             const Interruption& interruption) {
+                             const base::Interruption& interruption) {
   const experiment::DeviceStiffnessSettings& settings = options.device;
   experiment::TouchLimits limits = options.limits;
   limits.axis = context.axis();

@@ -62,8 +62,8 @@ SubjectSet subject_set(Context& context, const MaxStiffnessOptions& options, boo
 }
 
 /// How far a run is, in one line; what it throws on Ctrl-C stops the run between searches.
-experiment::ProgressReport reporter(Progress& progress, const Interruption& interruption, std::string what,
-                                    std::size_t known) {
+experiment::ProgressReport reporter(base::Progress& progress, const base::Interruption& interruption,
+                                    std::string what, std::size_t known) {
   return [&progress, &interruption, what = std::move(what),
           remaining = experiment::RemainingTime(seconds_now(), known)](std::size_t done_jobs,
                                                                        std::size_t count) {
@@ -101,11 +101,11 @@ std::string suffix(const SubjectSet& set) {
 
 MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options, SubjectSet set,
                             const std::vector<experiment::StiffnessCondition>& conditions,
-                            const Interruption& interruption,
+                            const base::Interruption& interruption,
                             std::vector<experiment::OperatorCalibration>& calibrations,
                             std::vector<std::filesystem::path>& files) {
   const std::filesystem::path folder = options.files.folder;
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   experiment::StiffnessRun run;
   run.threads = options.jobs;
   run.changes = options.changes;
@@ -155,14 +155,14 @@ Json document(const std::vector<MaxStiffnessStudy>& studies) {
 
 void print_section(const Context& context, const report::Section& section) {
   for (const std::string& paragraph : section.paragraphs)
-    print(context.out, "{}\n", wrapped(paragraph, context.width()));
+    base::print(context.out, "{}\n", base::wrapped(paragraph, context.width()));
   for (const report::Table& table : section.tables)
-    print(context.out, "\n{}", report::terminal_text(table, context.width()));
+    base::print(context.out, "\n{}", report::terminal_text(table, context.width()));
 }
 }  // namespace
 
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,
-                            const Interruption& interruption) {
+                            const base::Interruption& interruption) {
   const auto conditions = conditions_for(options.conditions);
   if (options.calibrate && options.files.folder.empty())
     throw UsageError("--calibrate writes the subject set to a folder: name it with --out");

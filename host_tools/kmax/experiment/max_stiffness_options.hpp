@@ -55,8 +55,8 @@ double seconds_now();
 
 /// Each does the experiment, prints it, and returns the exit code.
 int run_model_max_stiffness(Context& context, const MaxStiffnessOptions& options,
-                            const Interruption& interruption);
+                            const base::Interruption& interruption);
 int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& options,
-                             const Interruption& interruption);
+                             const base::Interruption& interruption);
 
 }  // namespace kmax::cli

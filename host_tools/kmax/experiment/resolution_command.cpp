@@ -73,7 +73,7 @@ experiment::ResolutionSettings settings_of(const ResolutionOptions& options,
 }
 
 experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& options,
-                                     const Interruption& interruption,
+                                     const base::Interruption& interruption,
                                      experiment::Provenance& /*provenance*/) {
   const experiment::ResolutionSettings settings = settings_of(options, {});
   // Of a set the people only: the device is paper 2's.
@@ -86,7 +86,8 @@ experiment::ResolutionStudy simulate(Context& context, const ResolutionOptions& 
 }
 
 experiment::ResolutionStudy measure(Context& context, const ResolutionOptions& options,
-                                    const Interruption& interruption, experiment::Provenance& provenance) {
+                                    const base::Interruption& interruption,
+                                    experiment::Provenance& provenance) {
   const experiment::ResolutionSettings settings = settings_of(options, experiment::resolution_on_device());
   return measure_study(context, interruption, "resolution", settings, options, provenance,
                        experiment::RigAxes::wall,

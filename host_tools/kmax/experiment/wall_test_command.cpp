@@ -55,7 +55,7 @@ std::vector<double> stiffnesses_of(const std::string& text) {
   try {
     const experiment::SweptSetting list = experiment::parse_swept_setting("wall.stiffness=" + text);
     for (const std::string& value : list.values) stiffnesses.push_back(std::stod(value));
-  } catch (const device::ValueError& error) {
+  } catch (const base::ValueError& error) {
     throw UsageError(fmt::format("--stiffness {}: {}", text, error.what()));
   }
   for (std::size_t i = 0; i < stiffnesses.size(); ++i) {
@@ -205,7 +205,7 @@ class WallTestRun {
   Context& context_;
   TouchRun run_;
   experiment::Provenance& provenance_;
-  const Interruption interruption_;
+  const base::Interruption interruption_;
   WallTestResult result_;
 };
 
@@ -230,10 +230,10 @@ int run_wall_test(Context& context, const WallTestOptions& options) {
   } else {
     const std::size_t width = std::min<std::size_t>(context.columns(), 80);
     for (const std::string& line : experiment::wall_test_words(result))
-      print(context.out, "{}\n", wrapped(line, width));
+      base::print(context.out, "{}\n", base::wrapped(line, width));
     for (const report::Table& table : {experiment::verdict_table(result), experiment::measure_table(result),
                                        experiment::limit_table(result)})
-      print(context.out, "\n{}", report::terminal_text(table, width));
+      base::print(context.out, "\n{}", report::terminal_text(table, width));
     print_names(context.out, files);
   }
   for (const experiment::WallTouch& touch : result.touches) {
@@ -243,7 +243,7 @@ int run_wall_test(Context& context, const WallTestOptions& options) {
       context.note(fmt::format("{}: {} trace records were lost on the way", name, touch.lost_records));
     if (!touch.counts()) context.note(fmt::format("{}: could not be judged and is left out", name));
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

@@ -52,13 +52,14 @@ void describe_modbus(Context& context) {
   std::map<std::pair<Table, std::uint16_t>, Parameter> by_address;
   for (const Parameter& parameter : device::all_parameters())
     by_address.emplace(std::pair(parameter.table(), parameter.address()), parameter);
-  print(context.out, "table,address,words,type,access,name,unit,allowed,default\n");
+  base::print(context.out, "table,address,words,type,access,name,unit,allowed,default\n");
   for (const auto& [place, parameter] : by_address) {
     const Json description = json::description_json(parameter);
-    print(context.out, "{},0x{:04X},{},{},{},{},{},\"{}\",{}\n", table_name(parameter), parameter.address(),
-          parameter.words(), description["type"].get<std::string>(), description["access"].get<std::string>(),
-          parameter.name(), parameter.definition().unit, parameter.writable() ? allowed_text(parameter) : "",
-          parameter.writable() ? value_text(parameter, parameter.default_raw()) : "");
+    base::print(context.out, "{},0x{:04X},{},{},{},{},{},\"{}\",{}\n", table_name(parameter),
+                parameter.address(), parameter.words(), description["type"].get<std::string>(),
+                description["access"].get<std::string>(), parameter.name(), parameter.definition().unit,
+                parameter.writable() ? allowed_text(parameter) : "",
+                parameter.writable() ? value_text(parameter, parameter.default_raw()) : "");
   }
 }
 
@@ -131,24 +132,24 @@ std::string change_text(const firmware::Entry& entry) {
 }
 
 void describe_markdown(Context& context) {
-  print(context.out,
-        R"(# Parameters
+  base::print(context.out,
+              R"(# Parameters
 
 Made by `kmax describe --format markdown` from the object dictionary. Each further axis has the axis
 parameters again: index + 0x{:X}, Modbus address + 0x{:X}, name with the prefix `axisN.`. Values of two
 registers have the high word first. What is set over CANopen only can be read over every link.
 )",
-        firmware::axis_index_offset, firmware::axis_modbus_offset);
+              firmware::axis_index_offset, firmware::axis_modbus_offset);
   std::uint16_t group = 0;
   for (const Parameter& parameter : device::all_parameters()) {
     if (parameter.axis() != 0) continue;
     const auto& entry = parameter.definition();
     if (entry.group.index != group) {
       group = entry.group.index;
-      print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
-            parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
-      print(context.out,
-            R"(| name | unit | allowed | default | type | object | register | help |
+      base::print(context.out, "\n## {}: {} ({}, Modbus {} registers)\n\n", entry.group.name, kind_of(entry),
+                  parameter.belongs_to_axis() ? "per axis" : "per device", table_name(parameter));
+      base::print(context.out,
+                  R"(| name | unit | allowed | default | type | object | register | help |
 |---|---|---|---|---|---|---|---|
 )");
     }
@@ -157,9 +158,10 @@ registers have the high word first. What is set over CANopen only can be read ov
     if (parameter.writable() && !entry.persistent) help += " Not saved.";
     const bool settable = entry.access != firmware::Access::read_only;
     const Json type = json::description_json(parameter)["type"];
-    print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name, entry.unit,
-          settable ? escaped(allowed_text(parameter)) : "read only", default_text(parameter),
-          type.get<std::string>(), parameter.index(), entry.object_subindex(), parameter.address(), help);
+    base::print(context.out, "| `{}` | {} | {} | {} | {} | 0x{:04X}:{} | 0x{:04X} | {} |\n", entry.name,
+                entry.unit, settable ? escaped(allowed_text(parameter)) : "read only",
+                default_text(parameter), type.get<std::string>(), parameter.index(), entry.object_subindex(),
+                parameter.address(), help);
   }
 }
 
@@ -168,7 +170,7 @@ int run_describe(Context& context, const DescribeOptions& options) {
   if (format.empty()) format = context.json ? "json" : "markdown";
   if (std::find(formats.begin(), formats.end(), format) == formats.end())
     throw UsageError(fmt::format("there is no format '{}'{}; there are {}", format,
-                                 device::did_you_mean(format, formats), fmt::join(formats, ", ")));
+                                 base::did_you_mean(format, formats), fmt::join(formats, ", ")));
   if (context.json && format != "json")
     throw UsageError(fmt::format("--json and --format {} exclude each other", format));
   if (options.node && format != "dbc")
@@ -182,7 +184,7 @@ int run_describe(Context& context, const DescribeOptions& options) {
   if (format == "dbc")
     description::write_dbc(context.out, static_cast<std::uint8_t>(
                                             options.node.value_or(Parameter::of<"node.id">().default_raw())));
-  return done;
+  return base::done;
 }
 }  // namespace
 

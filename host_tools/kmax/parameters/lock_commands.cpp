@@ -74,7 +74,7 @@ int say(Context& context, const device::LockStatus& now, const std::string& what
   } else {
     context.say(what, 0);
   }
-  return done;
+  return base::done;
 }
 
 struct LockOptions {
@@ -92,7 +92,7 @@ int run_lock(Context& context, const LockOptions& options) {
   const device::LockStatus before = status_of(context);
   const bool has_code = before.state != LockState::no_code;
   if (before.state == LockState::locked && (options.change || options.remove))
-    throw device::DeviceError("the device is locked: 'kmax unlock' first, then change or remove the code");
+    throw base::DeviceError("the device is locked: 'kmax unlock' first, then change or remove the code");
   if (before.state == LockState::locked) return say(context, before, "it is locked already");
   if (options.remove && !has_code) return say(context, before, "no code is set; the device is open");
   const bool sets = !options.remove && (options.change || !has_code);

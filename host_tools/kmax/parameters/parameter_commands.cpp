@@ -69,7 +69,7 @@ std::vector<Parameter> listed(const Context& context, const ListOptions& options
   std::sort(groups.begin(), groups.end());
   groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
   throw UsageError(fmt::format("no parameter's name or help contains '{}'{}", options.text,
-                               device::did_you_mean(options.text, groups)));
+                               base::did_you_mean(options.text, groups)));
 }
 
 int run_list(Context& context, const ListOptions& options) {
@@ -86,9 +86,9 @@ int run_list(Context& context, const ListOptions& options) {
     if (rows.empty()) {
       context.note("every value is its default");
     } else {
-      print_parameter_table(context.out, rows, terminal_behind(context.out), options.whole_texts);
+      print_parameter_table(context.out, rows, base::terminal_behind(context.out), options.whole_texts);
     }
-    return done;
+    return base::done;
   }
   Json document = Json::object();
   for (const ParameterRow& row : rows) {
@@ -98,7 +98,7 @@ int run_list(Context& context, const ListOptions& options) {
     document[row.parameter.name()] = one;
   }
   context.print(document);
-  return done;
+  return base::done;
 }
 
 /// The name a value is shown under: as the user wrote it if that says the axis.
@@ -127,12 +127,12 @@ int run_get(Context& context, const GetOptions& options) {
     if (context.json) {
       document[shown_name(names[i], parameters[i])] = json::value_and_unit_json(parameters[i], raw[i]);
     } else {
-      print(context.out, "{} = {}\n", shown_name(names[i], parameters[i]),
-            value_with_unit(parameters[i], raw[i]));
+      base::print(context.out, "{} = {}\n", shown_name(names[i], parameters[i]),
+                  value_with_unit(parameters[i], raw[i]));
     }
   }
   if (context.json) context.print(document);
-  return done;
+  return base::done;
 }
 
 void note_line_settings(Context& context, const std::vector<Assignment>& assignments, const Device& device) {
@@ -193,12 +193,12 @@ int run_set(Context& context, const SetOptions& options) {
     if (context.json) {
       document[parameter.name()] = json::value_and_unit_json(parameter, raw);
     } else {
-      print(context.out, "{} = {} (was {})\n", parameter.name(), value_with_unit(parameter, raw),
-            value_text(parameter, before[i]));
+      base::print(context.out, "{} = {} (was {})\n", parameter.name(), value_with_unit(parameter, raw),
+                  value_text(parameter, before[i]));
     }
   }
   if (context.json) context.print(document);
-  return done;
+  return base::done;
 }
 }  // namespace
 

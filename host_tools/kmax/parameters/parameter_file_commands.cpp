@@ -128,7 +128,7 @@ int run_dump(Context& context, const DumpOptions& options) {
   } else {
     context.out << text;
   }
-  return done;
+  return base::done;
 }
 
 /// What a user must know who reaches the device by what is about to change.
@@ -179,9 +179,9 @@ void check_rules_with(const std::vector<FileSetting>& settings, const std::vecto
   if (broken.refusal == firmware::Refusal::none) return;
   const auto owner = firmware::owner_of(broken.slot);
   const Parameter parameter(owner.entry, owner.axis);
-  throw device::ValueError(fmt::format("{} = {}: the device would refuse: {}", parameter.name(),
-                                       value_with_unit(parameter, values.raw(broken.slot)),
-                                       firmware::to_string(broken.refusal)));
+  throw base::ValueError(fmt::format("{} = {}: the device would refuse: {}", parameter.name(),
+                                     value_with_unit(parameter, values.raw(broken.slot)),
+                                     firmware::to_string(broken.refusal)));
 }
 
 /// The file's line that a refusal is about, if it has one.
@@ -201,10 +201,10 @@ void set_all(Device& device, const LoadOptions& options, const std::vector<FileS
     std::vector<Assignment> assignments;
     for (const FileSetting& setting : settings) assignments.push_back(setting.assignment);
     device.apply(assignments);
-  } catch (const device::ValueError& error) {
-    throw device::ValueError(with_place(error.what(), options.file, settings));
-  } catch (const device::DeviceError& error) {
-    throw device::DeviceError(with_place(error.what(), options.file, settings));
+  } catch (const base::ValueError& error) {
+    throw base::ValueError(with_place(error.what(), options.file, settings));
+  } catch (const base::DeviceError& error) {
+    throw base::DeviceError(with_place(error.what(), options.file, settings));
   }
 }
 
@@ -233,22 +233,22 @@ int run_load(Context& context, const LoadOptions& options) {
                    {"parameters", settings.size()},
                    {"changed", changed},
                    {"warnings", warnings}});
-    return done;
+    return base::done;
   }
   for (const auto& [setting, before] : changes) {
     const auto& [parameter, raw] = setting.assignment;
-    print(context.out, "{} = {} ({} {})\n", parameter.name(), value_with_unit(parameter, raw),
-          options.dry_run ? "is" : "was", value_text(parameter, before));
+    base::print(context.out, "{} = {} ({} {})\n", parameter.name(), value_with_unit(parameter, raw),
+                options.dry_run ? "is" : "was", value_text(parameter, before));
   }
   if (options.dry_run) {
-    print(context.out, "{}: {}, {} would change; nothing was set\n", options.file,
-          parameters_text(settings.size()), changes.size());
-    return done;
+    base::print(context.out, "{}: {}, {} would change; nothing was set\n", options.file,
+                parameters_text(settings.size()), changes.size());
+    return base::done;
   }
-  print(context.out, "{}: {} set and read back equal; {} changed\n", options.file,
-        parameters_text(settings.size()), changes.size());
+  base::print(context.out, "{}: {} set and read back equal; {} changed\n", options.file,
+              parameters_text(settings.size()), changes.size());
   if (!changes.empty()) context.note("until the next restart: only 'kmax save' keeps them");
-  return done;
+  return base::done;
 }
 
 int run_diff(Context& context, const DiffOptions& options) {
@@ -258,7 +258,7 @@ int run_diff(Context& context, const DiffOptions& options) {
   const auto present = values_of(device);
   const auto differences = differences_of(settings, present);
   const std::size_t not_in_file = present.size() - settings.size();
-  const int code = differences.empty() ? done : verdict_is_no;
+  const int code = differences.empty() ? base::done : base::verdict_is_no;
   if (context.json) {
     Json differing = Json::object();
     for (const auto& [setting, on_device] : differences) {
@@ -289,11 +289,11 @@ int run_diff(Context& context, const DiffOptions& options) {
     file_width = std::max(file_width, row.in_file.size());
   }
   if (differences.empty()) {
-    print(context.out, "{}: {}, equal on the device\n", file, parameters_text(settings.size()));
+    base::print(context.out, "{}: {}, equal on the device\n", file, parameters_text(settings.size()));
   } else {
     for (const Row& row : rows)
-      print(context.out, "{:<{}}  {:<{}}  {}\n", row.name, name_width, row.in_file, file_width,
-            row.on_device);
+      base::print(context.out, "{:<{}}  {:<{}}  {}\n", row.name, name_width, row.in_file, file_width,
+                  row.on_device);
   }
   if (not_in_file != 0)
     context.note(fmt::format("{} not in the file and not compared",

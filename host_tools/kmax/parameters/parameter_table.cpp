@@ -35,7 +35,7 @@ std::string range_text(const firmware::Entry& entry) {
   }
   if (entry.type != firmware::Type::float32)
     return fmt::format("{:.0f} .. {:.0f}", entry.minimum, entry.maximum);
-  return fmt::format("{} .. {}", device::number_text(entry.minimum), device::number_text(entry.maximum));
+  return fmt::format("{} .. {}", base::number_text(entry.minimum), base::number_text(entry.maximum));
 }
 
 Cells cells_of(const ParameterRow& row) {
@@ -56,12 +56,12 @@ std::string cut(const std::string& text, std::size_t length) {
 }
 
 void print_indented(std::ostream& out, std::string_view text, std::size_t width) {
-  print(out, "{:{}}{}\n", "", help_indent, wrapped(text, width - help_indent, help_indent));
+  base::print(out, "{:{}}{}\n", "", help_indent, base::wrapped(text, width - help_indent, help_indent));
 }
 }  // namespace
 
 void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows,
-                           std::optional<TerminalSize> terminal, bool whole_texts) {
+                           std::optional<base::TerminalSize> terminal, bool whole_texts) {
   constexpr std::size_t unlimited = std::numeric_limits<std::size_t>::max();
   const std::size_t width = terminal      ? std::max<std::size_t>(terminal->columns, 60)
                             : whole_texts ? 100
@@ -92,7 +92,7 @@ void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows
       line +=
           "  " + cut(cells.help, width == unlimited ? unlimited : width - std::min(width, line.size() + 2));
     line.erase(line.find_last_not_of(' ') + 1);
-    print(out, "{}\n", cut(line, width));
+    base::print(out, "{}\n", cut(line, width));
     if (!whole_texts || &cells == &table.front()) continue;
     if (cells.range.size() > range) print_indented(out, cells.range, width);
     if (!shows_defaults && !cells.default_value.empty())

@@ -19,6 +19,6 @@ struct ParameterRow {
 /// defaults are left out, and help where it has no room. Elsewhere (`terminal` is empty) they are whole, so
 /// that they can be searched. `whole_texts`: what would be cut follows on lines of its own.
 void print_parameter_table(std::ostream& out, std::span<const ParameterRow> rows,
-                           std::optional<TerminalSize> terminal, bool whole_texts);
+                           std::optional<base::TerminalSize> terminal, bool whole_texts);
 
 }  // namespace kmax::cli

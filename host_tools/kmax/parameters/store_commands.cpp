@@ -38,13 +38,13 @@ int run_save(Context& context) {
                    {"free_saves", status.free_saves},
                    {"erases", status.erases},
                    {"write_errors", status.write_errors}});
-    return done;
+    return base::done;
   }
   context.say(fmt::format("saved {} as record {}, read back equal; {} before the next erase",
                           counted(status.saved_parameters, "parameter"), status.sequence,
                           status.free_saves == 1 ? std::string("1 more save fits")
                                                  : fmt::format("{} more saves fit", status.free_saves)));
-  return done;
+  return base::done;
 }
 
 int run_defaults(Context& context) {
@@ -61,15 +61,15 @@ int run_defaults(Context& context) {
                                    {"unit", std::string(parameter.definition().unit)}};
     context.print(
         {{"parameters", all}, {"changed", changed}, {"unsaved_parameters", status.unsaved_parameters}});
-    return done;
+    return base::done;
   }
   for (const auto& [parameter, before] : changes)
-    print(context.out, "{} = {} (was {})\n", parameter.name(),
-          value_with_unit(parameter, parameter.default_raw()), value_text(parameter, before));
-  print(context.out, "all {} parameters have their defaults; {} changed\n", all, changes.size());
+    base::print(context.out, "{} = {} (was {})\n", parameter.name(),
+                value_with_unit(parameter, parameter.default_raw()), value_text(parameter, before));
+  base::print(context.out, "all {} parameters have their defaults; {} changed\n", all, changes.size());
   context.note(status.unsaved_parameters == 0 ? "that is what a restart brings, too"
                                               : "until the next restart: only 'kmax save' keeps them");
-  return done;
+  return base::done;
 }
 }  // namespace
 

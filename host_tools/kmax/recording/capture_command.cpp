@@ -138,9 +138,9 @@ std::string end_early(device::CaptureReader& reader, CaptureProgress::Phase phas
 }
 
 Captured capture(Context& context, device::Device& device, const CaptureOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   device::CaptureReader reader(device);
-  Progress progress(context.messages());
+  base::Progress progress(context.messages());
   const auto show = [&](const CaptureProgress& now) {
     if (interruption.requested()) throw Interrupted(end_early(reader, now.phase));
     progress.show(progress_text(now, options.settings.trigger));
@@ -182,7 +182,7 @@ int run_capture(Context& context, const CaptureOptions& given) {
     Json document = json::capture_json(captured, options.settings, options.file.empty());
     document["file"] = options.file.empty() ? Json(nullptr) : Json(options.file);
     context.print(document);
-    return done;
+    return base::done;
   }
   const std::string summary =
       fmt::format("{} samples of axis {}, {:g} ms apart, {} of them before the trigger '{}'",
@@ -194,7 +194,7 @@ int run_capture(Context& context, const CaptureOptions& given) {
   } else {
     context.say(fmt::format("{}: {}", options.file, summary));
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

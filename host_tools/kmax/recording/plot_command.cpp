@@ -86,9 +86,9 @@ int run_plot(Context& context, const PlotOptions& options) {
   if (context.json) {
     context.print({{"picture", picture}});
   } else {
-    print(context.out, "{}\n", picture);
+    base::print(context.out, "{}\n", picture);
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

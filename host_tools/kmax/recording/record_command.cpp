@@ -71,7 +71,7 @@ std::string summary(const RecordingProgress& progress) {
 
 /// Rows from the source to the file; says what there is of them also when it ends in an error.
 void write_rows(Context& context, record::RowSource& source, const RecordOptions& options,
-                const Interruption& interruption, RecordingProgress& progress) {
+                const base::Interruption& interruption, RecordingProgress& progress) {
   const NoPipeSignal no_pipe_signal;
   std::ofstream file;
   if (!options.to_standard_output()) {
@@ -81,7 +81,7 @@ void write_rows(Context& context, record::RowSource& source, const RecordOptions
   std::ostream& out = options.to_standard_output() ? context.out : file;
   const record::RowCsv csv(context.axes(), source.axes_apart());
   try {
-    Progress line(context.messages());
+    base::Progress line(context.messages());
     record::record(
         source, out, csv, options.seconds,
         [&](const RecordingProgress& now) {
@@ -97,7 +97,8 @@ void write_rows(Context& context, record::RowSource& source, const RecordOptions
   }
 }
 
-Finished record_polled(Context& context, const RecordOptions& options, const Interruption& interruption) {
+Finished record_polled(Context& context, const RecordOptions& options,
+                       const base::Interruption& interruption) {
   device::Device device = context.connect();
   record::PolledSource source(device, context.axes());
   Finished finished{.progress = {}, .source = fmt::format("{}, as fast as it answers", device.description())};
@@ -116,8 +117,8 @@ std::optional<std::uint32_t> held_back_since(Context& context, const PdoPlan& pl
   }
 }
 
-Finished record_pdos(Context& context, const link::DeviceAddress& address, const RecordOptions& options,
-                     const Interruption& interruption) {
+Finished record_pdos(Context& context, const device::DeviceAddress& address, const RecordOptions& options,
+                     const base::Interruption& interruption) {
   record::TelemetryRequest telemetry([&context] { return context.connect(); },
                                      [&context](const std::string& text) { context.note(text); });
   telemetry.ask();
@@ -133,7 +134,7 @@ Finished record_pdos(Context& context, const link::DeviceAddress& address, const
           "asked for again");
   });
   Finished finished{.progress = {},
-                    .source = fmt::format("{}, a PDO set every {:g} ms", link::text_of(address),
+                    .source = fmt::format("{}, a PDO set every {:g} ms", device::text_of(address),
                                           1000.0 * plan.period_ticks / firmware::tick_rate_hz)};
   write_rows(context, source, options, interruption, finished.progress);
   if (source.restarts() != 0)
@@ -179,15 +180,15 @@ void check(const Context& context, const RecordOptions& options) {
 int run_record(Context& context, const RecordOptions& options) {
   check(context, options);
   if (!options.to_standard_output()) base::check_writable(options.file);
-  const link::DeviceAddress address = link::parse_device_address(context.device_address());
+  const device::DeviceAddress address = device::parse_device_address(context.device_address());
   // From before a node is started to after it has been put back.
-  const Interruption interruption;
-  const Finished finished = address.kind == link::DeviceAddress::Kind::can
+  const base::Interruption interruption;
+  const Finished finished = address.kind == device::DeviceAddress::Kind::can
                                 ? record_pdos(context, address, options, interruption)
                                 : record_polled(context, options, interruption);
   if (context.json) {
     context.print(finished_json(context, finished, options));
-    return done;
+    return base::done;
   }
   const std::string text = fmt::format("{} ({})", summary(finished.progress), finished.source);
   if (options.to_standard_output()) {
@@ -195,7 +196,7 @@ int run_record(Context& context, const RecordOptions& options) {
   } else {
     context.say(fmt::format("{}: {}", options.file, text));
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

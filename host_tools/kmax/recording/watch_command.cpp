@@ -71,10 +71,10 @@ class Display {
       Json list = Json::array();
       for (const WatchedAxis& axis : axes) list.push_back(watch_json(axis));
       context_.out << Json{{"time_s", seconds}, {"axes", list}}.dump() << std::endl;
-    } else if (const auto terminal = terminal_behind(context_.out)) {
+    } else if (const auto terminal = base::terminal_behind(context_.out)) {
       std::vector<std::string> lines = watch_table(axes, terminal->columns, colour_);
       std::string title = fmt::format("{}  {:.1f} s  {:.1f} readings/s  q ends", device_, seconds, rate);
-      title.resize(beginning(title, terminal->columns).size());
+      title.resize(base::beginning(title, terminal->columns).size());
       lines.insert(lines.begin(), title);
       live_.show(std::move(lines), terminal->rows);
     } else if (seconds >= next_line_) {
@@ -92,15 +92,15 @@ class Display {
 };
 
 int run_watch(Context& context, const WatchOptions& options) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   device::Device device = context.connect();
-  link::Link& link = device.link();
+  device::Link& link = device.link();
   std::vector<WatchedAxis> axes = axes_to_watch(device, context.axes());
   Display display(context, device.description());
   PressedKeys keys;
   bool ended = false;
   const auto asked_to_end = [&] { return ended = ended || interruption.requested() || keys.pressed('q'); };
-  link::PeriodicYield yield(link);
+  device::PeriodicYield yield(link);
   const microseconds interval(static_cast<std::int64_t>(1e6 / options.rate));
   const microseconds start = link.now();
   const auto real_start = std::chrono::steady_clock::now();
@@ -120,7 +120,7 @@ int run_watch(Context& context, const WatchOptions& options) {
     // A simulated device's time may pass faster than the user's.
     std::this_thread::sleep_until(real_start + (link.now() - start));
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

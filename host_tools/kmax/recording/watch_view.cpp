@@ -29,7 +29,7 @@ const char* colour_of(const WatchedAxis& axis) {
 /// Cut to `width` before the colour, whose letters take no place.
 std::string coloured(std::string line, std::size_t width, const char* colour) {
   line.erase(line.find_last_not_of(' ') + 1);
-  line.resize(beginning(line, width).size());
+  line.resize(base::beginning(line, width).size());
   return colour == nullptr ? line : colour + line + "\x1b[0m";
 }
 }  // namespace
@@ -82,7 +82,7 @@ std::vector<std::string> watch_table(const std::vector<WatchedAxis>& axes, std::
     const std::string flags = joined(record::flag_words(measured.flags));
     add("  flags    " + flags, flags.find("wall ") != std::string::npos ? yellow : nullptr);
     if (const std::string trouble = trouble_of(axis); !trouble.empty()) {
-      for (const std::string& line : lines_of(trouble, width > 4 ? width - 2 : width))
+      for (const std::string& line : base::lines_of(trouble, width > 4 ? width - 2 : width))
         add("  " + line, yellow);
     }
   }
@@ -108,10 +108,10 @@ Json watch_json(const WatchedAxis& axis) {
           {"state", std::string(device::name_of(axis.status.state()))},
           {"armed", axis.status.armed()},
           {"tick", axis.measured.tick},
-          {"position_m", device::shortest_double(axis.measured.position)},
-          {"velocity_m_per_s", device::shortest_double(axis.measured.velocity)},
-          {"force_n", device::shortest_double(axis.measured.force)},
-          {"current_a", device::shortest_double(axis.measured.current)},
+          {"position_m", base::shortest_double(axis.measured.position)},
+          {"velocity_m_per_s", base::shortest_double(axis.measured.velocity)},
+          {"force_n", base::shortest_double(axis.measured.force)},
+          {"current_a", base::shortest_double(axis.measured.current)},
           {"flags", record::flag_words(axis.measured.flags)},
           {"trouble", trouble.empty() ? Json(nullptr) : Json(trouble)}};
 }

@@ -82,7 +82,7 @@ firmware::ParameterValues values_of(Context& context, const CheckOptions& option
   for (std::size_t i = 0; i < read.size(); ++i) values.set_raw(slot_of(read[i]), raw[i]);
   for (const auto& assignment : assignments) values.set_raw(slot_of(assignment.parameter), assignment.raw);
   if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
-    throw device::ValueError(std::string(firmware::to_string(broken.refusal)));
+    throw base::ValueError(std::string(firmware::to_string(broken.refusal)));
   return values;
 }
 
@@ -100,7 +100,7 @@ int judge_set(Context& context, const CheckOptions& options) {
   } else {
     context.out << check::judgement_text(judgement, hand.name, text_width(context));
   }
-  return judgement.pass ? done : verdict_is_no;
+  return judgement.pass ? base::done : base::verdict_is_no;
 }
 
 /// "met nowhere: ...", and what to do about it; empty if every criterion that applies is met somewhere.
@@ -161,16 +161,16 @@ int draw_map(Context& context, const CheckOptions& options) {
                    {"points_that_pass", passing},
                    {"picture", options.picture.empty() ? Json(nullptr) : Json(options.picture)},
                    {"csv", options.csv.empty() ? Json(nullptr) : Json(options.csv)}});
-    return done;
+    return base::done;
   }
-  print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
-        map.results.size());
+  base::print(context.out, "{} of {} points meet every criterion\n", passing["all"].get<std::size_t>(),
+              map.results.size());
   if (const std::string nowhere = met_nowhere(map); passing["all"] == 0 && !nowhere.empty())
     context.say(nowhere, 0);
   for (const std::string& file : {options.picture, options.csv}) {
-    if (!file.empty()) print(context.out, "{}\n", file);
+    if (!file.empty()) base::print(context.out, "{}\n", file);
   }
-  return done;
+  return base::done;
 }
 
 int explain(Context& context, const std::vector<std::string>& names) {
@@ -202,15 +202,15 @@ int explain(Context& context, const std::vector<std::string>& names) {
                      {"source", std::string(text.source)}});
     }
     context.print({{"criteria", all}});
-    return done;
+    return base::done;
   }
   for (const control::Criterion criterion : chosen)
-    print(context.out, "{}\n", check::explanation(criterion, text_width(context)));
-  if (!everything) return done;
+    base::print(context.out, "{}\n", check::explanation(criterion, text_width(context)));
+  if (!everything) return base::done;
   for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
     context.say(fmt::format("{}: {}", check::name_of(worth), check::meaning_of(worth)));
-  print(context.out, "\n{}", check::symbols_text());
-  return done;
+  base::print(context.out, "\n{}", check::symbols_text());
+  return base::done;
 }
 
 int run_check(Context& context, const CheckOptions& options) {

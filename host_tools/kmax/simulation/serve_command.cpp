@@ -38,7 +38,7 @@ int run_serve(Context& context, const ServeOptions& options) {
     throw UsageError(
         "--serial LINK or --can IFACE is needed: the name under which the serial line appears, or the bus to "
         "be a node on");
-  const Interruption interruption;
+  const base::Interruption interruption;
   const simulation::Scene scene =
       options.scene.empty() ? simulated_board::factory_scene() : simulated_board::open_scene(options.scene);
   std::optional<simulated_board::FileFlash> flash;
@@ -75,7 +75,7 @@ int run_serve(Context& context, const ServeOptions& options) {
     context.note(fmt::format(
         "{} CAN frames were lost on their way to other programs, whose queues (or the interface's) were full",
         can->lost()));
-  return done;
+  return base::done;
 }
 }  // namespace
 

@@ -171,7 +171,7 @@ int print_keys(Context& context, const SimulateOptions& options) {
     throw UsageError("--keys simulates nothing; give it alone");
   if (!context.json) {
     context.out << simulation::scene_keys_markdown();
-    return done;
+    return base::done;
   }
   Json keys = Json::array();
   for (const simulation::SceneKey& key : simulation::scene_keys())
@@ -183,7 +183,7 @@ int print_keys(Context& context, const SimulateOptions& options) {
                     {"allowed", key.allowed},
                     {"meaning", std::string(key.meaning)}});
   context.print({{"keys", keys}});
-  return done;
+  return base::done;
 }
 
 int run_simulate(Context& context, const SimulateOptions& options) {
@@ -203,9 +203,9 @@ int run_simulate(Context& context, const SimulateOptions& options) {
     context.print(result_json(scene, result));
   } else {
     context.say(fmt::format("{}: {}", scene.name, scene.description));
-    print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
-          result.simulated_s / result.real_s);
-    print(context.out, "  integrator: {}\n", simulation::to_string(scene.integrator));
+    base::print(context.out, "  {:.3g} s simulated, {:.0f} times as fast as real time\n", result.simulated_s,
+                result.simulated_s / result.real_s);
+    base::print(context.out, "  integrator: {}\n", simulation::to_string(scene.integrator));
     for (std::size_t n = 0; n < scene.axes.size(); ++n)
       context.say(fmt::format("  axis {} integrates: {}", n,
                               fmt::join(simulation::integrated_parts(scene.axes[n]), ", ")),
@@ -224,15 +224,16 @@ int run_simulate(Context& context, const SimulateOptions& options) {
     context.say(fmt::format("  force limited in {:.1f} % of the samples, clipped by the device in {:.1f} %",
                             result.limited_share * 100, result.clipped_share * 100),
                 4);
-    if (result.lost_edges > 0) print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
-    print(context.out, "  at the end: {}\n", device::to_string(result.end_state));
+    if (result.lost_edges > 0)
+      base::print(context.out, "  {} edges of the encoder lost\n", result.lost_edges);
+    base::print(context.out, "  at the end: {}\n", device::to_string(result.end_state));
     for (const std::string& file : {options.csv, options.picture}) {
-      if (!file.empty()) print(context.out, "  {}\n", file);
+      if (!file.empty()) base::print(context.out, "  {}\n", file);
     }
   }
-  if (result.fault == firmware::Fault::none) return done;
+  if (result.fault == firmware::Fault::none) return base::done;
   context.note(fmt::format("the run ended in a fault of {}: {}", axis, firmware::text_of(result.fault).what));
-  return failed;
+  return base::failed;
 }
 }  // namespace
 

@@ -104,7 +104,7 @@ void write_result(Context& context, const SweepOptions& options, const SceneSwee
     if (to_file) document["out"] = options.file;
     context.print(document);
   } else if (to_file) {
-    print(context.out, "{}: {}\n{}\n", sweep.scene, counted_verdicts(rows), options.file);
+    base::print(context.out, "{}: {}\n{}\n", sweep.scene, counted_verdicts(rows), options.file);
   } else {
     context.out << experiment::sweep_csv(sweep, rows);
   }
@@ -139,10 +139,10 @@ int run_sweep_command(Context& context, const SweepOptions& options) {
   if (!experiment::check_sweep(sweep) && options.repeats > 1)
     context.note(
         fmt::format("no part of {} has noise: the repeats of a combination are equal", options.scene));
-  const Interruption interruption;
+  const base::Interruption interruption;
   Rows rows;
   try {
-    Progress progress(context.messages());
+    base::Progress progress(context.messages());
     experiment::run_sweep(sweep, options.jobs, rows, [&](std::size_t run, std::size_t all) {
       if (interruption.requested()) throw SweepInterrupted("interrupted");
       progress.show(fmt::format("{} of {} runs", run, all));
@@ -153,10 +153,10 @@ int run_sweep_command(Context& context, const SweepOptions& options) {
     rows.resize(whole);
     write_result(context, options, sweep, rows);
     context.note(fmt::format("interrupted after {} of {} runs; those are whole", whole, sweep.runs()));
-    return failed;
+    return base::failed;
   }
   write_result(context, options, sweep, rows);
-  return note_refused(context, rows) ? done : failed;
+  return note_refused(context, rows) ? base::done : base::failed;
 }
 }  // namespace
 

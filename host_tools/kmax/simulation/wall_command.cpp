@@ -43,7 +43,7 @@ firmware::ParameterValues values_of(const WallOptions& options, std::size_t axis
     values.set_raw(firmware::slot_of(assignment.parameter.entry(), assignment.parameter.axis()),
                    assignment.raw);
   if (const auto broken = firmware::check_rules(values); broken.refusal != firmware::Refusal::none)
-    throw device::ValueError(std::string(firmware::to_string(broken.refusal)));
+    throw base::ValueError(std::string(firmware::to_string(broken.refusal)));
   return values;
 }
 
@@ -52,10 +52,10 @@ int evaluate_point(Context& context, const WallOptions& options, const wall::Wal
   if (context.json) {
     context.print({{"force_n", at.force}, {"magnetic_force_n", at.magnetic_force}, {"inside", at.inside}});
   } else {
-    print(context.out, "force {:.9g} N, of which magnetic {:.9g} N, {} the wall\n", at.force,
-          at.magnetic_force, at.inside ? "inside" : "outside");
+    base::print(context.out, "force {:.9g} N, of which magnetic {:.9g} N, {} the wall\n", at.force,
+                at.magnetic_force, at.inside ? "inside" : "outside");
   }
-  return done;
+  return base::done;
 }
 
 int run_wall(Context& context, const WallOptions& options) {
@@ -71,9 +71,9 @@ int run_wall(Context& context, const WallOptions& options) {
     if (context.json) {
       context.print({{"picture", options.picture}});
     } else {
-      print(context.out, "{}\n", options.picture);
+      base::print(context.out, "{}\n", options.picture);
     }
-    return done;
+    return base::done;
   }
   for (const device::Assignment& assignment :
        device::parse_assignments(options.assignments, context.axis())) {
@@ -91,15 +91,15 @@ int run_wall(Context& context, const WallOptions& options) {
   if (options.output == "-") {
     if (context.json) throw UsageError("--json and --out - exclude each other: both write standard output");
     context.out << wall::evaluated_table(evaluator, options.input).text;
-    return done;
+    return base::done;
   }
   const std::size_t rows = wall::evaluate_table(evaluator, options.input, options.output);
   if (context.json) {
     context.print({{"rows", rows}, {"out", options.output}});
   } else {
-    print(context.out, "{} rows written to {}\n", rows, options.output);
+    base::print(context.out, "{} rows written to {}\n", rows, options.output);
   }
-  return done;
+  return base::done;
 }
 }  // namespace
 

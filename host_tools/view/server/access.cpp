@@ -47,12 +47,12 @@ std::string Access::refusal_of_stream(const Credentials& asked) const {
     return fmt::format("a page of the origin '{}' may not use this stream", shown(*asked.origin));
   constexpr std::string_view bearer = "Bearer ";
   if (asked.authorization.starts_with(bearer) &&
-      is_token(device::trimmed(asked.authorization.substr(bearer.size()))))
+      is_token(base::trimmed(asked.authorization.substr(bearer.size()))))
     return {};
   constexpr std::string_view offered = "token.";
   for (std::string_view rest = asked.protocols; !rest.empty();) {
     const std::size_t comma = rest.find(',');
-    const std::string_view one = device::trimmed(rest.substr(0, comma));
+    const std::string_view one = base::trimmed(rest.substr(0, comma));
     if (one.starts_with(offered) && is_token(one.substr(offered.size()))) return {};
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
   }

@@ -88,7 +88,7 @@ std::string assignment(const Received& message, const std::string& name, const J
   if (value.is_number()) {
     const double number = value.get<double>();
     if (!std::isfinite(number)) message.fail(fmt::format("{}: the value is not finite", name));
-    return fmt::format("{}={}", name, device::number_text(number));
+    return fmt::format("{}={}", name, base::number_text(number));
   }
   if (value.is_string() && value.get_ref<const std::string&>().size() <= longest_value)
     return fmt::format("{}={}", name, value.get_ref<const std::string&>());
@@ -129,7 +129,7 @@ device::CaptureSettings capture_settings(const Received& message, std::size_t ax
   const std::string wanted = message.at("trigger").is_null() ? "now" : message.text("trigger");
   try {
     settings.trigger = device::capture_trigger_of(wanted);
-  } catch (const device::ValueError& error) {
+  } catch (const base::ValueError& error) {
     message.fail(fmt::format("\"trigger\": {}", error.what()));
   }
   if (const Json& level = message.at("level"); !level.is_null()) {
@@ -150,7 +150,7 @@ ProcedureSettings procedure_settings(const Received& message, std::size_t axis) 
     settings.trials = message.whole("trials", static_cast<std::uint32_t>(text.trials), most_trials, 1);
     if (text.trials == 0 && !message.at("trials").is_null())
       message.fail(fmt::format("\"trials\": {} has no touches to repeat", settings.name));
-  } catch (const device::ValueError& error) {
+  } catch (const base::ValueError& error) {
     message.fail(fmt::format("\"name\": {}", error.what()));
   }
   return settings;
@@ -172,7 +172,7 @@ Command parse_command(std::string_view text) {
     known = true;
   }
   if (!known) {
-    const std::string meant = device::did_you_mean(type.substr(0, longest_value), names);
+    const std::string meant = base::did_you_mean(type.substr(0, longest_value), names);
     message.fail(
         fmt::format("there is no message '{}'{}", type.substr(0, longest_value),
                     meant.empty() ? fmt::format("; messages are {}", fmt::join(names, ", ")) : meant));

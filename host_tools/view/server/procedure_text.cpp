@@ -38,7 +38,7 @@ const ProcedureText& procedure_named(std::string_view name) {
     if (text.name == name) return text;
     names.push_back(text.name);
   }
-  throw device::ValueError(
+  throw base::ValueError(
       fmt::format("there is no procedure '{}'; procedures are {}", name, fmt::join(names, ", ")));
 }
 

@@ -17,7 +17,7 @@ struct ProcedureText {
   std::size_t trials;       ///< touches of each wall unless others are asked for; 0: it has none
 };
 std::span<const ProcedureText> procedure_texts();
-/// Throws device::ValueError with the names that are allowed.
+/// Throws base::ValueError with the names that are allowed.
 const ProcedureText& procedure_named(std::string_view name);
 
 struct ProcedureSettings {

@@ -22,7 +22,7 @@ namespace pins = board::odrive_v3::pins;
 using chip::GpioPort;
 using chip::ResetCause;
 
-VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config)
+VirtualBoard::VirtualBoard(const base::ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config)
     : image_(image),
       world_(world),
       core_(bus_, clocks_, drivers::stm32f4::interrupt_count),
@@ -30,7 +30,7 @@ VirtualBoard::VirtualBoard(const ElfImage& image, BoardWorld* world, const Virtu
       events_(processor_),
       brake_(config.bootstrap),
       frozen_outputs_(config.frozen_outputs) {
-  for (const ElfSegment& segment : image_.segments()) {
+  for (const base::ElfSegment& segment : image_.segments()) {
     const auto memory = bus_.memory(segment.address, segment.bytes.size());
     if (memory.empty() || !memory_map::flash.contains(segment.address)) {
       throw std::runtime_error(

@@ -116,7 +116,7 @@ class VirtualBoard {
  public:
   /// The image is flashed into an erased part and the power is switched on. The world must outlive the board;
   /// without one the connectors are open. Throws std::runtime_error when the image cannot run.
-  VirtualBoard(const ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config = {});
+  VirtualBoard(const base::ElfImage& image, BoardWorld* world, const VirtualBoardConfig& config = {});
   VirtualBoard(const VirtualBoard&) = delete;
   VirtualBoard& operator=(const VirtualBoard&) = delete;
 
@@ -207,7 +207,7 @@ class VirtualBoard {
   void look_at_world(BoardTime now);
   [[noreturn]] void fail() const;
 
-  ElfImage image_;
+  base::ElfImage image_;
   BoardWorld* world_;
   BoardClocks clocks_;
   Bus bus_;

@@ -19,11 +19,11 @@ void BoardLink::wait(std::chrono::microseconds duration) {
   if (duration.count() > 0) board_.run_for(static_cast<double>(duration.count()) * 1e-6);
 }
 
-std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> request, link::Repeat repeat) {
-  for (int attempt = 1; repeat == link::Repeat::if_lost && attempt < 3; ++attempt) {
+std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> request, device::Repeat repeat) {
+  for (int attempt = 1; repeat == device::Repeat::if_lost && attempt < 3; ++attempt) {
     try {
       return exchange_once(request);
-    } catch (const link::LinkError&) {
+    } catch (const device::LinkError&) {
     }
   }
   return exchange_once(request);
@@ -42,12 +42,12 @@ std::vector<std::uint8_t> BoardLink::exchange_once(std::span<const std::uint8_t>
     reply.insert(reply.end(), bytes.begin(), bytes.end());
     const bool refused = reply.size() >= 2 && (reply[1] & 0x80U) != 0;
     if (reply.size() < (refused ? 5U : expected)) continue;
-    if (firmware::modbus::crc_of(reply) != 0) throw link::LinkError("the board's reply has a wrong CRC");
+    if (firmware::modbus::crc_of(reply) != 0) throw device::LinkError("the board's reply has a wrong CRC");
     board_.run_for(0.002);  // the silence between two frames is 1.75 ms
     return reply;
   }
-  throw link::LinkError(fmt::format("the board does not answer within 0.6 s: {} of {} bytes; {} resets, {}",
-                                    reply.size(), expected, board_.resets() - 1, board_.where()));
+  throw device::LinkError(fmt::format("the board does not answer within 0.6 s: {} of {} bytes; {} resets, {}",
+                                      reply.size(), expected, board_.resets() - 1, board_.where()));
 }
 
 void BoardLink::arm(std::size_t axis) {

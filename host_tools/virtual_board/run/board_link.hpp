@@ -13,8 +13,8 @@ namespace kmax::virtual_board {
 
 /// What host tools say to the image: Modbus RTU on the virtual board's serial line, in board time. Unit 1. A
 /// reading that gets lost (a tick is longer than a character at high rates) is asked for again, as the serial
-/// link does. Errors: link::LinkError without an answer within 0.6 s, link::RegisterRefused.
-class BoardLink final : public link::FrameLink {
+/// link does. Errors: device::LinkError without an answer within 0.6 s, device::RegisterRefused.
+class BoardLink final : public device::FrameLink {
  public:
   explicit BoardLink(VirtualBoard& board) : FrameLink(1), board_(board) {}
 
@@ -28,7 +28,7 @@ class BoardLink final : public link::FrameLink {
   void arm(std::size_t axis);
 
  private:
-  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> request, link::Repeat repeat) override;
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> request, device::Repeat repeat) override;
   std::vector<std::uint8_t> exchange_once(std::span<const std::uint8_t> request);
 
   VirtualBoard& board_;

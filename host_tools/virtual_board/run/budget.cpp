@@ -157,7 +157,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     add("velocity.window", std::int64_t{16});
     add("haptic.rate", 20000.0);
   }
-  const ElfImage image = ElfImage::load(elf_path);
+  const base::ElfImage image = base::ElfImage::load(elf_path);
   SceneWorld world(scene);
   VirtualBoard board(image, &world, config);
   store_parameters(board, simulated_board::assignments_of(scene));

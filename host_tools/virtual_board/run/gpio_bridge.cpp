@@ -46,7 +46,7 @@ GpioBridge::GpioBridge(VirtualBoard& board, const std::string& chip, ReportText 
   }
   for (unsigned line = 0; line < levels_.size(); ++line) {
     const fs::path value = line_folder(chip_, line) / "value";
-    levels_[line] = link::FileDescriptor(open(value.c_str(), O_RDONLY | O_CLOEXEC));
+    levels_[line] = base::FileDescriptor(open(value.c_str(), O_RDONLY | O_CLOEXEC));
   }
   // As the board's own resistors: not in reset, not in the boot loader, contact closed.
   show(reset, true);

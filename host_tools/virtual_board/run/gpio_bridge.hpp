@@ -49,7 +49,7 @@ class GpioBridge {
   ReportText report_;
   std::filesystem::path chip_;
   /// Kept open: a look at the lines is a few system calls, a thousand times a second.
-  std::array<link::FileDescriptor, emergency_stop + 1> levels_;
+  std::array<base::FileDescriptor, emergency_stop + 1> levels_;
   bool held_ = false, stopped_ = false, in_boot_loader_ = false;
   int shown_fault_ = -1, shown_healthy_ = -1;
 };

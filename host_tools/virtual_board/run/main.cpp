@@ -58,16 +58,16 @@ class StoreFile {
 };
 
 int run(const Options& options) {
-  const cli::Interruption interruption;
+  const base::Interruption interruption;
   const simulation::Scene scene = simulated_board::open_scene(options.scene);
-  const auto image = ElfImage::load(options.elf);
+  const auto image = base::ElfImage::load(options.elf);
   virtual_board::SceneWorld world(scene);
   if (options.budget && !(world.has_drive(0) && world.has_drive(1))) {
     fmt::print(
         stderr,
         "kmax-board: --budget needs a scene with a motor on both axes, such as 'motor_axes'; '{}' has not\n",
         scene.name);
-    return cli::wrong_usage;
+    return base::wrong_usage;
   }
   if (!world.has_drive(0) && !world.has_drive(1)) {
     fmt::print(stderr,
@@ -79,7 +79,7 @@ int run(const Options& options) {
   if (options.budget) {
     const auto report = virtual_board::measure_budget(options.elf, scene, config);
     fmt::print("{}", options.json ? virtual_board::budget_json(report) : virtual_board::budget_table(report));
-    return report.kept() ? cli::done : cli::verdict_is_no;
+    return report.kept() ? base::done : base::verdict_is_no;
   }
   virtual_board::VirtualBoard board(image, &world, config);
   std::optional<StoreFile> store;
@@ -124,7 +124,7 @@ int run(const Options& options) {
   if (pace.behind_s() > 0.0)
     fmt::print(stderr, "this machine was too slow or busy: {:.3f} s of real time were not simulated\n",
                pace.behind_s());
-  return cli::done;
+  return base::done;
 }
 
 }  // namespace
@@ -141,7 +141,7 @@ int main(int argc, char** argv) {
       "  kmax --device serial:/tmp/board arm --hold      the person of the scene presses; Ctrl-C disarms\n"
       "  kmax-board build/stm32f405/kmax-odrive_v3.elf --budget      instructions of each step of the "
       "tick\n\n" +
-      std::string(cli::exit_code_text));
+      std::string(base::exit_code_text));
   Options options;
   app.add_option("ELF", options.elf, "The image, as linked")->required()->check(CLI::ExistingFile);
   app.add_option("--serial", options.serial, "Name under which USART2 appears as a pseudo-terminal")
@@ -192,19 +192,19 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? cli::done : cli::wrong_usage;
+    return app.exit(error) == 0 ? base::done : base::wrong_usage;
   }
   try {
     if (options.json && !options.budget) {
       fmt::print(stderr, "kmax-board: --json belongs to --budget\n");
-      return cli::wrong_usage;
+      return base::wrong_usage;
     }
     return run(options);
   } catch (const simulation::SceneError& error) {
     fmt::print(stderr, "kmax-board: {}\n", error.what());
-    return cli::wrong_usage;
+    return base::wrong_usage;
   } catch (const std::exception& error) {
     fmt::print(stderr, "kmax-board: {}\n", error.what());
-    return cli::failed;
+    return base::failed;
   }
 }

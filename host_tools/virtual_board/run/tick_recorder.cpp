@@ -24,7 +24,7 @@ void each_instruction(const Bus& bus, std::uint32_t address, std::uint32_t size,
 
 }  // namespace
 
-TickRecorder::TickRecorder(const ElfImage& image, VirtualBoard& board)
+TickRecorder::TickRecorder(const base::ElfImage& image, VirtualBoard& board)
     : board_(board),
       handler_(image.required_symbol("ISR_adc").address),
       axis_tick_(

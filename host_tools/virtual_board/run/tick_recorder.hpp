@@ -30,7 +30,7 @@ struct RecordedTick {
 class TickRecorder {
  public:
   /// Before the board's first run.
-  TickRecorder(const ElfImage& image, VirtualBoard& board);
+  TickRecorder(const base::ElfImage& image, VirtualBoard& board);
   TickRecorder(const TickRecorder&) = delete;
   TickRecorder& operator=(const TickRecorder&) = delete;
 

@@ -53,7 +53,7 @@ void UsbipServer::exchange() {
 
 void UsbipServer::accept_clients() {
   while (clients_.size() < most_clients) {
-    link::FileDescriptor socket(
+    base::FileDescriptor socket(
         ::accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (socket.number() < 0) return;
     const int yes = 1;

@@ -30,7 +30,7 @@ class UsbipServer {
 
  private:
   struct Client {
-    link::FileDescriptor socket;
+    base::FileDescriptor socket;
     std::unique_ptr<UsbipSession> session;
     std::vector<std::uint8_t> to_send{};
     bool gone = false;
@@ -42,7 +42,7 @@ class UsbipServer {
   VirtualBoard& board_;
   std::function<void(const std::string&)> say_;
   UsbEnumeration enumeration_;
-  link::FileDescriptor listener_;
+  base::FileDescriptor listener_;
   std::uint16_t port_ = 0;
   std::vector<std::unique_ptr<Client>> clients_;
 };

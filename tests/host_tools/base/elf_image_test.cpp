@@ -8,7 +8,7 @@
 #include <cstring>
 #include <functional>
 
-namespace kmax::elf_image_test {
+namespace kmax::base::elf_image_test {
 
 struct File {
   Elf32_Ehdr header{};
@@ -137,4 +137,4 @@ TEST(ElfImage, SaysWhichFileCannotBeRead) {
   EXPECT_THROW(ElfImage::load("."), ElfError);
 }
 
-}  // namespace kmax::elf_image_test
+}  // namespace kmax::base::elf_image_test

@@ -14,7 +14,7 @@
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::device::number_text_test::numbers_test {
+namespace kmax::base::numbers_test {
 
 TEST(NumberText, IsShortAndPlainWherePeopleReadIt) {
   EXPECT_EQ(number_text(2.4f), "2.4");
@@ -93,7 +93,8 @@ TEST(Unit, EveryUnitOfTheDictionaryIsItsOwnSuffix) {
   for (std::size_t i = 0; i < firmware::entry_count; ++i) {
     const auto unit = firmware::entry_at(i).unit;
     EXPECT_EQ(convert(1, unit, unit), 1.0) << unit;
-    for (const std::string& suffix : suffixes_of(unit)) EXPECT_GT(convert(1, suffix, unit), 0.0) << suffix;
+    for (const std::string& suffix : suffixes_of(unit))
+      EXPECT_GT(convert(1, suffix, unit), 0.0) << suffix;
   }
 }
 
@@ -131,4 +132,4 @@ TEST(WrittenNumber, AnythingElseIsRefused) {
   EXPECT_EQ(refusal("5 N", ""), "'5 N': it has no unit, so nothing may follow the number");
 }
 
-}  // namespace kmax::device::number_text_test::numbers_test
+}  // namespace kmax::base::numbers_test

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-namespace kmax::cli::print_test {
+namespace kmax::base::print_test {
 
 template <typename... Values>
 std::string printed(fmt::format_string<Values...> text, Values&&... values) {
@@ -41,4 +41,4 @@ TEST(Print, AStreamThatFailsSaysSo) {
   EXPECT_EQ(out.str(), "");
 }
 
-}  // namespace kmax::cli::print_test
+}  // namespace kmax::base::print_test

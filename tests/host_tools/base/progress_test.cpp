@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace kmax::cli::progress_test {
+namespace kmax::base::progress_test {
 
 TEST(Progress, ElsewhereThanOnATerminalItIsALineNowAndThen) {
   std::ostringstream messages;
@@ -28,4 +28,4 @@ TEST(Progress, NothingShownLeavesNoTrace) {
   EXPECT_EQ(messages.str(), "");
 }
 
-}  // namespace kmax::cli::progress_test
+}  // namespace kmax::base::progress_test

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace kmax::device::suggestion_test {
+namespace kmax::base::suggestion_test {
 
 const std::vector<std::string> names = {"wall.stiffness", "wall.damping",   "guard.damping",    "force.limit",
                                         "current.limit",  "velocity.limit", "temperature.limit"};
@@ -44,4 +44,4 @@ TEST(Closest, NoMoreThanThreeAndNothingFarFetched) {
   EXPECT_EQ(did_you_mean("stiffness", names), "; did you mean wall.stiffness?");
 }
 
-}  // namespace kmax::device::suggestion_test
+}  // namespace kmax::base::suggestion_test

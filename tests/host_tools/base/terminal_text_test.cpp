@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace kmax::cli::terminal_text_test {
+namespace kmax::base::terminal_text_test {
 
 using Lines = std::vector<std::string>;
 
@@ -29,7 +29,7 @@ TEST(DisplayWidth, OfUtf8) {
   EXPECT_EQ(display_width("力覚"), 4u);       // two wide characters
   EXPECT_EQ(display_width("\xF0\x9F\x98\x80"), 2u);
   EXPECT_EQ(display_width("a\xE2\x80\x8B"
-                          "b"),
+                                "b"),
             2u);  // zero width space
 }
 
@@ -46,8 +46,8 @@ TEST(TerminalText, CountsColumnsAndBreaksNoCharacter) {
   EXPECT_EQ(lines_of("力覚", 3), (Lines{"力", "覚"}));
   EXPECT_EQ(lines_of("力覚", 1), (Lines{"力", "覚"})) << "a character is wider than the line";
   EXPECT_EQ(lines_of("e\xCC\x81"
-                     "e",
-                     1),
+                           "e",
+                           1),
             (Lines{"e\xCC\x81", "e"}))
       << "the accent stays with its letter";
   EXPECT_EQ(beginning("µm", 1), "µ");
@@ -63,7 +63,7 @@ TEST(TerminalText, WidthZeroLeavesATextAsItIs) {
 
 TEST(TerminalText, ControlCharactersAreNotPrintable) {
   EXPECT_EQ(printable("a\tb\x1B[1m\xC2\x9B"
-                      "2µ"),
+                            "2µ"),
             "a b [1m 2µ");
 }
 
@@ -93,4 +93,4 @@ TEST(TerminalText, WhatIsNoTerminalHasNoSize) {
   EXPECT_FALSE(terminal_behind(text));
 }
 
-}  // namespace kmax::cli::terminal_text_test
+}  // namespace kmax::base::terminal_text_test

@@ -45,8 +45,8 @@ class CalibratedDevice {
       : CalibratedDevice(open(scene_name, seed)) {}
   explicit CalibratedDevice(simulation::Scene scene)
       : scene_(std::move(scene)),
-        link_(new link::SimLink(scene_)),
-        device_(std::unique_ptr<link::Link>(link_)) {
+        link_(new device::SimLink(scene_)),
+        device_(std::unique_ptr<device::Link>(link_)) {
     set({"modbus.baud_rate=921600"});
     link_->wait(std::chrono::milliseconds(300));  // the power stage starts
   }
@@ -77,7 +77,7 @@ class CalibratedDevice {
   std::uint32_t records() { return device::Store(device_).status().sequence; }
 
   device::Device& device() { return device_; }
-  link::SimLink& link() { return *link_; }
+  device::SimLink& link() { return *link_; }
   const simulation::SceneAxis& axis() const { return scene_.axes[0]; }
 
   std::function<void()> on_progress;  ///< whenever the calibration reports progress
@@ -92,7 +92,7 @@ class CalibratedDevice {
   }
 
   simulation::Scene scene_;
-  link::SimLink* link_;
+  device::SimLink* link_;
   device::Device device_;
 };
 

@@ -23,7 +23,7 @@ struct HeldUpDevice {
   explicit HeldUpDevice(const std::string& name)
       : scene(simulated_board::open_scene(name)),
         link(new host_tools_test::DisturbedLink(scene)),
-        device(std::unique_ptr<link::Link>(link)) {
+        device(std::unique_ptr<device::Link>(link)) {
     device.apply(device::parse_assignments({"modbus.baud_rate=921600"}));
     link->wait(milliseconds(300));  // the power stage starts
     link->before_request = [this] {
@@ -113,7 +113,7 @@ TEST_P(HeldUpCalibration, AgainAndAgainItCannotBeCarriedOut) {
     std::string said;
     try {
       EXPECT_TRUE(tested.calibrate(all_steps()).pass()) << "nothing holds it up";
-    } catch (const device::DeviceError& error) {
+    } catch (const base::DeviceError& error) {
       said = error.what();
     }
     if (!beginning.in_copy()) {

@@ -188,7 +188,7 @@ TEST(Procedure, CompensationFindsTheCogging) {
 }
 
 TEST(Procedure, ADeviceWithoutMotorHasNothingToCalibrate) {
-  auto link = std::make_unique<link::SimLink>(simulated_board::factory_scene());
+  auto link = std::make_unique<device::SimLink>(simulated_board::factory_scene());
   device::Device device(std::move(link));
   EXPECT_CONTAINS(host_tools_test::thrown_message<calibration::NothingToCalibrate>(
                       [&] { calibration::calibrate(device, {}, nullptr, [](const std::string&) {}); }),
@@ -199,7 +199,7 @@ TEST(Procedure, AnArmedAxisIsLeftAlone) {
   CalibratedDevice device("dc_coreless_a");
   device.set({"wall.position=-1", "link.timeout=0"});
   device::Drive(device.device(), 0).arm();
-  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { device.calibrate(); }), "armed");
+  EXPECT_CONTAINS(host_tools_test::thrown_message<base::DeviceError>([&] { device.calibrate(); }), "armed");
   EXPECT_TRUE(device.armed());
 }
 

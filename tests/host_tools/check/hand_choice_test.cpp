@@ -49,7 +49,7 @@ TEST(HandChoice, WhatIsNoHandIsRefusedWithThePlace) {
   EXPECT_CONTAINS(refusal("[operator\n"), "hand.toml:");
   EXPECT_CONTAINS(refusal("operator = 3\n"), "operator");
   for (const std::string& missing : {std::string("subject_2"), folder.path().string()})
-    EXPECT_CONTAINS(thrown_message<device::ValueError>([&missing] { choose_hand(missing); }),
+    EXPECT_CONTAINS(thrown_message<base::ValueError>([&missing] { choose_hand(missing); }),
                     "none, subject_1");
 }
 

@@ -12,8 +12,8 @@
 
 namespace kmax::check::stability_map_test {
 
+using base::ValueError;
 using device::Parameter;
-using device::ValueError;
 using firmware::ParameterValues;
 using host_tools_test::thrown_message;
 

@@ -23,7 +23,7 @@ using std::chrono::seconds;
 
 /// A device that can be captured and whose contact, fault or excitation comes at a tick of one's choice.
 struct Bench {
-  Bench() : link(new CapturingLink), device(std::unique_ptr<link::Link>(link)) {}
+  Bench() : link(new CapturingLink), device(std::unique_ptr<device::Link>(link)) {}
   void set(std::uint32_t flags, std::uint32_t from_tick) {
     link->event_at = [flags, from_tick](std::uint32_t tick) {
       return firmware::CaptureEvent{tick >= from_tick ? flags : 0u, 0.0f, 0.0f};
@@ -89,7 +89,8 @@ TEST_F(CaptureReaderTest, GivesEachChannelInItsUnitAndEachSampleItsTick) {
   EXPECT_EQ(captured.time(30), 0.0);
   EXPECT_DOUBLE_EQ(captured.time(0), -30 * 3 / 20000.0);
   EXPECT_DOUBLE_EQ(captured.time(99), 69 * 3 / 20000.0);
-  expect_thrown<ValueError>([&] { captured.column("velocity"); }, "position, force, electrical_angle, count");
+  expect_thrown<base::ValueError>([&] { captured.column("velocity"); },
+                                  "position, force, electrical_angle, count");
 }
 
 TEST_F(CaptureReaderTest, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
@@ -105,7 +106,7 @@ TEST_F(CaptureReaderTest, AFullMemoryTakesAsFewRequestsAsTheProtocolAllows) {
   });
   EXPECT_EQ(captured.samples(), 4096u);
   constexpr int windows =
-      (2 * 12288 + link::RegisterLink::read_count_max - 1) / link::RegisterLink::read_count_max;
+      (2 * 12288 + device::RegisterLink::read_count_max - 1) / device::RegisterLink::read_count_max;
   EXPECT_EQ(bench.link->window_requests, windows);
   EXPECT_EQ(static_cast<int>(calls), windows);
   EXPECT_EQ(reported, 12288u);
@@ -118,7 +119,7 @@ TEST_F(CaptureReaderTest, WithoutATriggerItSaysWhichAndStopsTheCapture) {
   reader.arm(settings_of({"force"}, 10, CaptureTrigger::contact));
   const auto began = bench.link->now();
   int waiting = 0;
-  expect_thrown<DeviceError>(
+  expect_thrown<base::DeviceError>(
       [&] {
         reader.wait(seconds(3), [&](const CaptureProgress& progress) {
           waiting += progress.phase == CaptureProgress::Phase::waiting ? 1 : 0;
@@ -134,7 +135,7 @@ TEST_F(CaptureReaderTest, WithoutATriggerItSaysWhichAndStopsTheCapture) {
   CaptureSettings level = settings_of({"force"}, 10, CaptureTrigger::force);
   level.level = 2.5;
   reader.arm(level);
-  expect_thrown<DeviceError>([&] { reader.wait(seconds(1)); }, "'force' above 2.5 N");
+  expect_thrown<base::DeviceError>([&] { reader.wait(seconds(1)); }, "'force' above 2.5 N");
 }
 
 // The patience is for the trigger: 100 samples of 0.05 s each are waited for nevertheless.
@@ -163,12 +164,12 @@ TEST_F(CaptureReaderTest, ADeviceThatFallsBehindRealTimeIsWaitedForAsLongAsItTak
 TEST_F(CaptureReaderTest, AnAxisWithoutTicksIsNotWaitedForForever) {
   bench.link->ticking = false;
   reader.arm(settings_of({"force"}, 100));
-  expect_thrown<DeviceError>([&] { reader.wait(seconds(1)); }, "did not come");
+  expect_thrown<base::DeviceError>([&] { reader.wait(seconds(1)); }, "did not come");
   bench.link->ticking = true;
   CaptureSettings slow = settings_of({"force"}, 100);
   slow.interval = 100;
   reader.arm(slow);
-  expect_thrown<DeviceError>(
+  expect_thrown<base::DeviceError>(
       [&] {
         reader.wait(seconds(1), [&](const CaptureProgress& progress) {
           if (progress.phase == CaptureProgress::Phase::running) bench.link->ticking = false;
@@ -204,9 +205,9 @@ TEST_F(CaptureReaderTest, StoppedItHasWhatWasTakenSinceTheTrigger) {
 }
 
 TEST_F(CaptureReaderTest, ACaptureThatIsNotCompleteCannotBeRead) {
-  expect_thrown<DeviceError>([&] { reader.read(); }, "idle");
+  expect_thrown<base::DeviceError>([&] { reader.read(); }, "idle");
   reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
-  expect_thrown<DeviceError>([&] { reader.read(); }, "waiting");
+  expect_thrown<base::DeviceError>([&] { reader.read(); }, "waiting");
 }
 
 TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
@@ -214,7 +215,7 @@ TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
     Bench bench;
     CaptureReader reader(bench.device);
     reader.arm(settings_of({"force"}, 10, CaptureTrigger::fault));
-    expect_thrown<DeviceError>(
+    expect_thrown<base::DeviceError>(
         [&] { reader.wait(seconds(3), [&](const CaptureProgress&) { bench.link->capture.stop(); }); },
         "stopped by another program");
   }
@@ -225,7 +226,7 @@ TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
     reader.wait(seconds(1));
     // In the middle of reading; a capture of 300 samples lasts for three requests.
     int left = completes ? 1 : 2;
-    expect_thrown<DeviceError>(
+    expect_thrown<base::DeviceError>(
         [&] {
           reader.read([&](const CaptureProgress&) {
             if (left-- == 1) bench.link->arm();
@@ -240,12 +241,12 @@ TEST(CaptureReader, AnotherProgramMayTakeTheCaptureAwayAndThatIsSeen) {
   firmware::CaptureConfig wider{.channels = {CaptureChannel::force, CaptureChannel::flags}, .samples = 10};
   bench.link->capture.arm(wider);
   reader.wait(seconds(1));
-  expect_thrown<DeviceError>([&] { reader.read(); }, "another program");
+  expect_thrown<base::DeviceError>([&] { reader.read(); }, "another program");
 }
 
 TEST(CaptureTriggers, GoByTheirNames) {
   for (const std::string& name : capture_trigger_names()) EXPECT_EQ(name_of(capture_trigger_of(name)), name);
-  EXPECT_EQ(host_tools_test::thrown_message<ValueError>([] { capture_trigger_of("later"); }),
+  EXPECT_EQ(host_tools_test::thrown_message<base::ValueError>([] { capture_trigger_of("later"); }),
             "there is no trigger 'later'; triggers are now, contact, force, velocity, fault, excitation");
 }
 
@@ -254,7 +255,7 @@ TEST_F(CaptureReaderTest, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSen
   const auto refused = [&](auto change, const std::string& part) {
     CaptureSettings settings = settings_of({"force", "count"}, 100);
     change(settings);
-    expect_thrown<ValueError>([&] { reader.arm(settings); }, part);
+    expect_thrown<base::ValueError>([&] { reader.arm(settings); }, part);
   };
   refused([](auto& s) { s.channels = {}; }, "0 channels");
   refused([](auto& s) { s.channels.resize(5, "force"); }, "5 channels");
@@ -272,18 +273,19 @@ TEST_F(CaptureReaderTest, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSen
 
 TEST_F(CaptureReaderTest, ADeviceThatRefusesSaysWhy) {
   bench.link->refuses = true;
-  expect_thrown<DeviceError>([&] { reader.arm(settings_of({"force"}, 10)); }, "could not be armed");
+  expect_thrown<base::DeviceError>([&] { reader.arm(settings_of({"force"}, 10)); }, "could not be armed");
 }
 
 TEST(CaptureChannels, HaveUnitsAndNoneIsNotOne) {
   EXPECT_EQ(capture_channel_names().size(), firmware::capture_channel_count - 1);
   EXPECT_EQ(capture_channel_unit("velocity"), "m/s");
   EXPECT_EQ(capture_channel_unit("duty_a"), "");
-  expect_thrown<ValueError>([&] { capture_channel_unit("dutty_a"); }, "duty_a");
+  expect_thrown<base::ValueError>([&] { capture_channel_unit("dutty_a"); }, "duty_a");
 }
 
 /// What the firmware of a simulated board computed in each tick of `ticks`, by its tick number.
-std::map<std::uint32_t, firmware::AxisReport> watch_ticks(link::SimLink& link, std::size_t axis, int ticks) {
+std::map<std::uint32_t, firmware::AxisReport> watch_ticks(device::SimLink& link, std::size_t axis,
+                                                          int ticks) {
   std::map<std::uint32_t, firmware::AxisReport> seen;
   auto& board = link.simulation().board();
   for (int i = 0; i < ticks; ++i) {
@@ -297,8 +299,8 @@ std::map<std::uint32_t, firmware::AxisReport> watch_ticks(link::SimLink& link, s
 // On the whole firmware: dictionary, tick, memory, line and the simulated device. Nothing may be late by a
 // tick, or rounded on the way.
 TEST(CaptureReaderOnSimulatedBoard, EveryValueIsWhatThatTickComputed) {
-  auto owned = std::make_unique<link::SimLink>(simulated_board::open_scene("two_axes"));
-  link::SimLink& link = *owned;
+  auto owned = std::make_unique<device::SimLink>(simulated_board::open_scene("two_axes"));
+  device::SimLink& link = *owned;
   Device device(std::move(owned));
   link.wait(seconds(1));
   CaptureReader reader(device);
@@ -334,7 +336,7 @@ TEST(CaptureReaderOnSimulatedBoard, EveryValueIsWhatThatTickComputed) {
 }
 
 TEST(CaptureReaderOnSimulatedBoard, ArmingWithoutReadingLeavesTheNextOneFree) {
-  Device device(std::make_unique<link::SimLink>(simulated_board::open_scene("two_axes")));
+  Device device(std::make_unique<device::SimLink>(simulated_board::open_scene("two_axes")));
   {
     CaptureReader forgotten(device);
     forgotten.arm(settings_of({"count"}, 10, CaptureTrigger::fault));
@@ -352,7 +354,7 @@ TEST(CaptureReaderOnSimulatedBoard, ArmingWithoutReadingLeavesTheNextOneFree) {
 
 // The square wave of voltage begins in the trigger's own tick, and the winding's current follows it.
 TEST(CaptureReaderOnSimulatedBoard, AnExcitationIsSeenFromItsFirstTick) {
-  Device device(std::make_unique<link::SimLink>(simulated_board::open_scene("dc_coreless_a")));
+  Device device(std::make_unique<device::SimLink>(simulated_board::open_scene("dc_coreless_a")));
   device.link().wait(seconds(1));
   device.apply(parse_assignments({"drive.mode=excitation", "excitation.kind=voltage", "excitation.bias=1.5",
                                   "excitation.ramp=0", "excitation.duration=0.5", "excitation.travel=0.2"}));

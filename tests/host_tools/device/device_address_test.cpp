@@ -7,7 +7,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::device_address_test {
+namespace kmax::device::device_address_test {
 
 using host_tools_test::thrown_message;
 using Kind = DeviceAddress::Kind;
@@ -114,4 +114,4 @@ TEST(DefaultDeviceAddress, ComesFromTheEnvironment) {
   EXPECT_EQ(device_address_of_environment(), std::nullopt);
 }
 
-}  // namespace kmax::link::device_address_test
+}  // namespace kmax::device::device_address_test

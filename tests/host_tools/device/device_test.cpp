@@ -55,7 +55,7 @@ TEST_F(OpenDevice, ReadsEverythingInOneRequestPerGroup) {
 TEST(Device, AnotherDictionaryIsRefusedWithAdvice) {
   Connection connection;
   connection.fake->registers.values().set_whole<"info.dictionary_checksum">(0x12345678);
-  const auto message = thrown_message<DeviceError>([&] { connection.open(); });
+  const auto message = thrown_message<base::DeviceError>([&] { connection.open(); });
   EXPECT_CONTAINS(message, "firmware 0.1.0");
   EXPECT_CONTAINS(message, "12345678");
   EXPECT_CONTAINS(message, "flash");
@@ -82,7 +82,7 @@ TEST_F(OpenDevice, NothingToSetSendsNothing) {
 TEST_F(OpenDevice, AParameterGivenTwiceIsRefused) {
   const Assignment one{Parameter::of<"wall.stiffness">(), std::bit_cast<std::uint32_t>(5.0f)};
   const Assignment twice[] = {one, one};
-  EXPECT_CONTAINS(thrown_message<ValueError>([&] { device.apply(twice); }), "twice");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { device.apply(twice); }), "twice");
 }
 
 TEST_F(OpenDevice, ATargetThatADisarmedAxisDropsIsExplainedAsThat) {
@@ -93,7 +93,7 @@ TEST_F(OpenDevice, ATargetThatADisarmedAxisDropsIsExplainedAsThat) {
         connection.fake->registers.values().set_whole<"profile.target_torque">(0, axis);
       }
     };
-    const auto message = thrown_message<DeviceError>([&] { device.apply(assignments({target})); });
+    const auto message = thrown_message<base::DeviceError>([&] { device.apply(assignments({target})); });
     EXPECT_CONTAINS(message, "only while the axis is armed");
     EXPECT_EQ(message.find("another program"), std::string::npos);
   }
@@ -123,7 +123,7 @@ TEST(Device, EveryRefusalIsExplainedAndChangesNothing) {
     Connection connection;
     Device device = connection.open();
     const auto before = connection.fake->settings();
-    const auto message = thrown_message<ValueError>([&] { device.apply(one.set); });
+    const auto message = thrown_message<base::ValueError>([&] { device.apply(one.set); });
     for (const std::string& part : one.said) EXPECT_CONTAINS(message, part);
     EXPECT_CONTAINS(message, "nothing was changed");
     EXPECT_EQ(connection.fake->settings(), before) << message;
@@ -144,7 +144,7 @@ TEST_F(OpenDevice, ARefusalWhoseReasonIsGoneIsToldInTheLinksWords) {
     EXPECT_EQ(registers.last_refusal().refusal, Refusal::none);
   };
   const Assignment huge{Parameter::of<"wall.stiffness">(), std::bit_cast<std::uint32_t>(2e6f)};
-  const auto message = thrown_message<DeviceError>([&] { device.apply({&huge, 1}); });
+  const auto message = thrown_message<base::DeviceError>([&] { device.apply({&huge, 1}); });
   EXPECT_CONTAINS(message, "the device refused function 16 at register");
   EXPECT_CONTAINS(message, "nothing was changed");
   EXPECT_EQ(message.find("not refused"), std::string::npos) << message;
@@ -154,7 +154,7 @@ TEST_F(OpenDevice, WhatMayNotChangeWhileArmedIsTheMomentsFaultNotTheValues) {
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
     connection.fake->machines[1].command(word, firmware::Link::serial, Refusal::none, false);
   const auto before = connection.fake->settings();
-  const auto message = thrown_message<DeviceError>([&] {
+  const auto message = thrown_message<base::DeviceError>([&] {
     device.apply(assignments({"wall.stiffness=7", "wall.law=magnetic"}));
   });
   EXPECT_CONTAINS(message, "wall.law = magnetic");
@@ -167,12 +167,14 @@ TEST_F(OpenDevice, ABoundThatIsOnlyTightenedWhileArmedIsRefusedWithItsDirectionA
   for (const std::uint16_t word : std::initializer_list<std::uint16_t>{6, 7, 15})
     connection.fake->machines[0].command(word, firmware::Link::serial, Refusal::none, false);
   const auto before = connection.fake->settings();
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.damping=7"})); }),
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { device.apply(assignments({"wall.damping=7"})); }),
                   "it can only be lowered from 0 N s/m, or raised up to wall.damping_ceiling (0 N s/m)");
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"force.ramp_time=0"})); }),
-                  "it can only be raised from 0.2 s");
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"interference.force=-1"})); }),
-                  "it can only be brought nearer to 0 from 0 N, or raised up to force.ceiling (0 N)");
+  EXPECT_CONTAINS(
+      thrown_message<base::DeviceError>([&] { device.apply(assignments({"force.ramp_time=0"})); }),
+      "it can only be raised from 0.2 s");
+  EXPECT_CONTAINS(
+      thrown_message<base::DeviceError>([&] { device.apply(assignments({"interference.force=-1"})); }),
+      "it can only be brought nearer to 0 from 0 N, or raised up to force.ceiling (0 N)");
   EXPECT_EQ(connection.fake->settings(), before);
 }
 
@@ -190,8 +192,9 @@ TEST_F(OpenDevice, ATransactionSomebodyKeepsOpenIsNotWaitedForForEver) {
     const std::uint16_t words[] = {0x3F80, 0};
     connection.fake->write_holding(Parameter::of<"wall.damping">().address(), words);
   };
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { device.apply(assignments({"wall.stiffness=50"})); }),
-                  "a transaction is open");
+  EXPECT_CONTAINS(
+      thrown_message<base::DeviceError>([&] { device.apply(assignments({"wall.stiffness=50"})); }),
+      "a transaction is open");
 }
 
 TEST_F(OpenDevice, AnotherWriterIsFoundOut) {
@@ -200,7 +203,7 @@ TEST_F(OpenDevice, AnotherWriterIsFoundOut) {
       connection.fake->registers.values().set_real<"wall.stiffness">(42.0f);
   };
   const auto message =
-      thrown_message<DeviceError>([&] { device.apply(assignments({"wall.stiffness=3580"})); });
+      thrown_message<base::DeviceError>([&] { device.apply(assignments({"wall.stiffness=3580"})); });
   EXPECT_CONTAINS(message, "wall.stiffness was set to 3580 N/m");
   EXPECT_CONTAINS(message, "42 N/m");
 }
@@ -224,7 +227,7 @@ TEST_P(LostMessages, LeaveTheOldSetOrTheNewOne) {
     std::string message;
     try {
       device.apply(wanted);
-    } catch (const link::LinkError& error) {
+    } catch (const device::LinkError& error) {
       message = error.what();
     }
     const int requests = connection.link->requests;
@@ -290,7 +293,7 @@ TEST_F(OpenDevice, AProgramThatIsSuspendedAgainAndAgainGivesUp) {
   connection.link->requests = 0;
   connection.link->after_request = [&](int) { connection.fake->pass(5'000'000); };
   const auto set = assignments({"wall.stiffness=3580", "force.limit=2"});
-  EXPECT_CONTAINS(thrown_message<StoodStill>([&] { device.apply(set); }), "too long");
+  EXPECT_CONTAINS(thrown_message<base::StoodStill>([&] { device.apply(set); }), "too long");
   EXPECT_EQ(connection.link->requests, 6);  // begun and dropped three times
   EXPECT_EQ(connection.fake->settings(), before);
 }

@@ -23,7 +23,7 @@ class DriveTest : public testing::Test {
 
   std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
   FakeLink* link = new FakeLink(fake);
-  Device device{std::unique_ptr<link::Link>(link)};
+  Device device{std::unique_ptr<device::Link>(link)};
   Drive drive{device, 1};
 };
 
@@ -56,7 +56,7 @@ TEST_F(DriveTest, ArmsFromEveryStateWithoutAFault) {
 
 TEST_F(DriveTest, ARefusalComesInWordsAndLeavesTheAxisDisabled) {
   fake->obstacle[1] = Refusal::handle_inside_wall;
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.arm(); }), "inside the wall");
   EXPECT_EQ(state(), DriveState::switch_on_disabled);
   // The refusal of then is still shown by the device, and must not be taken for one of now.
   fake->obstacle[1] = Refusal::none;
@@ -70,7 +70,7 @@ TEST_F(DriveTest, AHandleInsideTheWallIsShownTheWayOut) {
     fake->registers.values().set_real<"measured.position">(position, 1);
     fake->registers.values().set_real<"wall.position">(wall, 1);
     fake->registers.values().set_whole<"wall.side">(static_cast<std::uint32_t>(side), 1);
-    return thrown_message<DeviceError>([&] { drive.arm(); });
+    return thrown_message<base::DeviceError>([&] { drive.arm(); });
   };
   EXPECT_CONTAINS(
       words(-0.0102f, 0.0031f, 1),
@@ -83,7 +83,7 @@ TEST_F(DriveTest, AHandleInsideTheWallIsShownTheWayOut) {
 
 TEST_F(DriveTest, AnOldRefusalIsNotTakenForTheAnswerThatIsStillToCome) {
   fake->obstacle[1] = Refusal::handle_inside_wall;
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.arm(); }), "inside the wall");
   fake->obstacle[1] = Refusal::none;
   fake->judgement_us = 30'000;
   drive.arm();
@@ -92,7 +92,7 @@ TEST_F(DriveTest, AnOldRefusalIsNotTakenForTheAnswerThatIsStillToCome) {
 
 TEST_F(DriveTest, ADeviceThatDoesNotFollowIsReported) {
   fake->deaf_to_commands = true;
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "stays in 'Switch on disabled'");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.arm(); }), "stays in 'Switch on disabled'");
 }
 
 // A program that is stopped just after it has asked for the state has an answer of then, whatever the time.
@@ -115,7 +115,7 @@ TEST_F(DriveTest, AfterAStandstillAnOldRefusalIsNotTakenForTheAnswer) {
     link->after_request = nullptr;
     fake->judgement_us = 0;
     fake->obstacle[1] = Refusal::handle_inside_wall;
-    EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.arm(); }), "inside the wall");
+    EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.arm(); }), "inside the wall");
     fake->obstacle[1] = Refusal::none;
     fake->judgement_us = 30'000;
     link->requests = 0;
@@ -130,13 +130,13 @@ TEST_F(DriveTest, AfterAStandstillAnOldRefusalIsNotTakenForTheAnswer) {
 TEST_F(DriveTest, AnArmedAxisThatDoesNotStopIsAnError) {
   drive.arm();
   fake->deaf_to_commands = true;
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.disarm(); }), "cut its power");
-  EXPECT_CONTAINS(thrown_message<DeviceError>([&] { drive.stop(); }), "cut its power");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.disarm(); }), "cut its power");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { drive.stop(); }), "cut its power");
 }
 
 TEST_F(DriveTest, AFaultIsToldWithItsNumbersAndWhatToCheck) {
   fake->trip(1, Fault::over_speed, 6.25f, 5.0f);
-  const auto message = thrown_message<DeviceError>([&] { drive.arm(); });
+  const auto message = thrown_message<base::DeviceError>([&] { drive.arm(); });
   EXPECT_CONTAINS(message, "faster than velocity.limit");
   EXPECT_CONTAINS(message, "6.25 m/s, bound 5 m/s");
   EXPECT_CONTAINS(message, "encoder.counts_per_turn");
@@ -188,7 +188,7 @@ TEST_F(DriveTest, ClearsAFaultWhoseCauseIsGone) {
 TEST_F(DriveTest, AFaultWhoseCauseRemainsIsNamed) {
   fake->trip(1, Fault::encoder, 0, 0);
   fake->cause_remains[1] = true;
-  const auto message = thrown_message<DeviceError>([&] { drive.clear(); });
+  const auto message = thrown_message<base::DeviceError>([&] { drive.clear(); });
   EXPECT_CONTAINS(message, "remains");
   EXPECT_CONTAINS(message, "encoder");
 }
@@ -218,7 +218,7 @@ TEST_F(DriveTest, ALostMessageWhileArmingLeavesNoForce) {
       bool failed = false;
       try {
         drive.arm();
-      } catch (const link::LinkError&) {
+      } catch (const device::LinkError&) {
         failed = true;
       }
       EXPECT_EQ(fake->machines[1].armed(), !failed) << "request " << lost;

@@ -15,7 +15,7 @@ using firmware::LogEntry;
 using firmware::LogEvent;
 
 /// A device whose log is what a test says, some of it torn when it is read.
-class Log final : public link::RegisterLink {
+class Log final : public device::RegisterLink {
  public:
   void put(std::uint32_t number) {
     entries[number % firmware::fault_log_entries] = {
@@ -64,7 +64,7 @@ TEST(FaultLogOfDevice, WhatIsReplacedMeanwhileIsReadAgain) {
   log.torn = 2;
   EXPECT_EQ(numbers(log), std::vector<std::uint32_t>{5});
   log.torn = 3;
-  const auto message = host_tools_test::thrown_message<DeviceError>([&] { numbers(log); });
+  const auto message = host_tools_test::thrown_message<base::DeviceError>([&] { numbers(log); });
   EXPECT_CONTAINS(message, "place 5 of the fault log holds no whole entry in 3 attempts");
   EXPECT_CONTAINS(message, "'kmax faults --clear'");
 }

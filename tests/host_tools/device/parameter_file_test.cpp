@@ -20,7 +20,7 @@ std::vector<FileSetting> parse(std::string_view text) {
   return parse_parameter_file(text, "f.toml");
 }
 std::string complaint(std::string_view text) {
-  return thrown_message<ValueError>([&] { parse(text); });
+  return thrown_message<base::ValueError>([&] { parse(text); });
 }
 
 std::uint32_t any_allowed(const Parameter& parameter) {
@@ -252,10 +252,10 @@ TEST(ParameterFile, ADumpThatWasCutOffIsRefusedWhereverItEnds) {
   EXPECT_EQ(parse_parameter_file(whole, "f").size(), all.size());
   const std::size_t head = whole.find('\n') + 1;
   for (std::size_t length = head; length + 2 < whole.size(); length += length < head + 400 ? 1 : 97)
-    EXPECT_THROW(parse_parameter_file(whole.substr(0, length), "f"), ValueError) << length;
+    EXPECT_THROW(parse_parameter_file(whole.substr(0, length), "f"), base::ValueError) << length;
   const std::string half = whole.substr(0, whole.find("\n[", whole.size() / 2));
   EXPECT_CONTAINS(
-      thrown_message<ValueError>([&] { parse_parameter_file(half, "f"); }),
+      thrown_message<base::ValueError>([&] { parse_parameter_file(half, "f"); }),
       "f: it was cut off: it begins as a file of 'kmax dump', and the last line of one, '# End of the "
       "parameters.', is missing");
   EXPECT_GT(parse_parameter_file(half.substr(head), "f").size(), 10U)
@@ -265,11 +265,13 @@ TEST(ParameterFile, ADumpThatWasCutOffIsRefusedWhereverItEnds) {
 TEST(ParameterFile, IsReadFromDisk) {
   const host_tools_test::TemporaryFolder folder;
   const std::string path = folder.write("a.toml", "wall.law = 1\nwall.lav = 1\n").string();
-  EXPECT_TRUE(thrown_message<ValueError>([&] { read_parameter_file(path); }).starts_with(path + ":2:6: "));
+  EXPECT_TRUE(
+      thrown_message<base::ValueError>([&] { read_parameter_file(path); }).starts_with(path + ":2:6: "));
   folder.write("a.toml", "wall.law = 1\n");
   EXPECT_EQ(read_parameter_file(path).size(), 1u);
   for (const std::string& wrong : {folder.path().string(), (folder / "none.toml").string(), std::string()})
-    EXPECT_CONTAINS(thrown_message<ValueError>([&] { read_parameter_file(wrong); }), ": cannot be read");
+    EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { read_parameter_file(wrong); }),
+                    ": cannot be read");
 }
 
 }  // namespace kmax::device::parameter_file_test

@@ -20,24 +20,26 @@ TEST(Resolve, ANameWithoutPrefixIsOnTheDefaultAxis) {
 
 TEST(Resolve, DeviceNamesHaveNoAxis) {
   EXPECT_EQ(resolve("link.timeout", 1), Parameter::of<"link.timeout">());
-  const auto message = thrown_message<ValueError>([] { resolve("axis1.link.timeout"); });
+  const auto message = thrown_message<base::ValueError>([] { resolve("axis1.link.timeout"); });
   EXPECT_CONTAINS(message, "belongs to the whole device");
   EXPECT_CONTAINS(message, "write link.timeout");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis0.node.id"); }), "whole device");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("axis0.node.id"); }), "whole device");
 }
 
 TEST(Resolve, SaysWhatIsWrong) {
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis2.wall.stiffness"); }), "axes are 0 .. 1");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis18446744073709551617.wall.stiffness"); }),
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("axis2.wall.stiffness"); }),
                   "axes are 0 .. 1");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("wall"); }), "is a group");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis1.wall"); }), "'kmax list axis1.wall.'");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("axis1.stiffness"); }),
+  EXPECT_CONTAINS(
+      thrown_message<base::ValueError>([] { resolve("axis18446744073709551617.wall.stiffness"); }),
+      "axes are 0 .. 1");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("wall"); }), "is a group");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("axis1.wall"); }), "'kmax list axis1.wall.'");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("axis1.stiffness"); }),
                   "axis1.wall.stiffness or axis1.excitation.stiffness?");
-  EXPECT_CONTAINS(thrown_message<ValueError>([] { resolve("zzz"); }), "kmax list");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] { resolve("zzz"); }), "kmax list");
   for (const char* bad :
        {"", ".", "axis", "axis.", "axis1.", "axisx.wall.law", "wall.", "WALL.LAW", "wall.law "})
-    thrown_message<ValueError>([bad] { resolve(bad); });
+    thrown_message<base::ValueError>([bad] { resolve(bad); });
 }
 
 TEST(Parameter, EveryNameResolvesToItselfAndToAPlaceOfItsOwn) {

@@ -9,7 +9,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::settings_file_test {
+namespace kmax::device::settings_file_test {
 
 class SettingsFile : public testing::Test {
  protected:
@@ -57,4 +57,4 @@ TEST_F(SettingsFile, IsWhereTheSpecificationSays) {
   setenv("HOME", home.c_str(), 1);
 }
 
-}  // namespace kmax::link::settings_file_test
+}  // namespace kmax::device::settings_file_test

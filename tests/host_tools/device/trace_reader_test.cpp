@@ -21,8 +21,8 @@ constexpr Parameter next_record = Parameter::of<"trace.next">();
 /// A simulated device whose axis is being traced.
 struct Traced {
   explicit Traced(double rate, std::size_t axis = 0, std::uint16_t interval = 1, const char* scene = nullptr)
-      : device(std::make_unique<link::SimLink>(scene == nullptr ? simulated_board::factory_scene()
-                                                                : simulated_board::open_scene(scene))) {
+      : device(std::make_unique<device::SimLink>(scene == nullptr ? simulated_board::factory_scene()
+                                                                  : simulated_board::open_scene(scene))) {
     set<"haptic.rate">(rate, axis);
     device.link().wait(milliseconds(100));
     reader.emplace(device, axis, interval);
@@ -77,7 +77,7 @@ TEST(TraceReader, EveryFifthRecordOfTheSecondAxis) {
 TEST(TraceReader, AFullRingLosesNothingOneMoreLosesOne) {
   Traced traced(20000);
   traced.reader->stop();
-  auto& board = dynamic_cast<link::SimLink&>(traced.device.link()).simulation().board();
+  auto& board = dynamic_cast<device::SimLink&>(traced.device.link()).simulation().board();
   std::set<std::uint32_t> seen;
   for (std::uint32_t ticks = 440; ticks <= 520; ++ticks) {
     const std::uint32_t begin = traced.records();
@@ -162,7 +162,7 @@ TEST(TraceReader, PositionsAndForcesAreThoseOfTheDevice) {
   drive.disarm();
   ASSERT_FALSE(samples.empty());
   const double length = firmware::count_length(
-      dynamic_cast<link::SimLink&>(traced.device.link()).simulation().board().application().values(), 0);
+      dynamic_cast<device::SimLink&>(traced.device.link()).simulation().board().application().values(), 0);
   bool pushed = false;
   for (const TraceSample& sample : samples) {
     const double counts = sample.position / length;

@@ -5,7 +5,7 @@
 #include "host_tools/device/link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::usb_address_test {
+namespace kmax::device::usb_address_test {
 
 using host_tools_test::thrown_message;
 
@@ -70,4 +70,4 @@ TEST_F(UsbAddress, AnyAddressMayLeadToADeviceOnUsb) {
     EXPECT_EQ(port_of(text), "") << text;
 }
 
-}  // namespace kmax::link::usb_address_test
+}  // namespace kmax::device::usb_address_test

@@ -18,7 +18,7 @@ float parse_float(const Parameter& parameter, std::string_view text) {
   return std::bit_cast<float>(parse_value(parameter, text));
 }
 std::string complaint(const Parameter& parameter, std::string_view text) {
-  return thrown_message<ValueError>([&] { parse_value(parameter, text); });
+  return thrown_message<base::ValueError>([&] { parse_value(parameter, text); });
 }
 
 constexpr Parameter stiffness = Parameter::of<"wall.stiffness">();
@@ -111,7 +111,7 @@ TEST(ParseValue, ChoicesByNameOrNumber) {
 
 TEST(ParseAssignments, RefusesWhatCannotBeSet) {
   const auto refusal = [](std::vector<std::string> texts) {
-    return thrown_message<ValueError>([&] { parse_assignments(texts); });
+    return thrown_message<base::ValueError>([&] { parse_assignments(texts); });
   };
   EXPECT_CONTAINS(refusal({"wall.stiffness"}), "NAME=VALUE");
   EXPECT_CONTAINS(refusal({"wall.stiffness="}), "missing");
@@ -146,7 +146,7 @@ TEST(ParseAssignments, AWallIsPutWhereTheHandleIs) {
   parse_assignments({"wall.position=0.1", "wall.stiffness=1"}, 0, here);
   EXPECT_EQ(asked, 3) << "nobody needs it";
   const auto refused = [&](const std::string& text, const HandlePosition& known) {
-    return thrown_message<ValueError>([&] { parse_assignments({text}, 0, known); });
+    return thrown_message<base::ValueError>([&] { parse_assignments({text}, 0, known); });
   };
   EXPECT_CONTAINS(refused("wall.position=here", {}), "needs a device");
   EXPECT_CONTAINS(refused("wall.position=here5mm", here), "write here, here+5mm or here-5mm");
@@ -186,7 +186,7 @@ RC_GTEST_PROP(ParseValue, AgreesWithTheDeviceOnEveryFloat, (std::uint32_t patter
   std::uint32_t raw = 0;
   try {
     raw = parse_value(position, text);
-  } catch (const ValueError&) {
+  } catch (const base::ValueError&) {
     accepted = false;
   }
   RC_ASSERT(accepted == allowed);

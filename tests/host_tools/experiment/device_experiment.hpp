@@ -60,7 +60,7 @@ class DeviceExperiment : public StalledBoard {
     stall = {Stall::Of::program, 30, [](int) { return true; }};
     touches = 0;
     notices.clear();
-    EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>(run), "the host was silent");
+    EXPECT_CONTAINS(host_tools_test::thrown_message<base::DeviceError>(run), "the host was silent");
     EXPECT_EQ(touches, 1 + most_standstills);
     EXPECT_EQ(notices.size(), static_cast<std::size_t>(most_standstills));
     expect_disarmed_and_restored();

@@ -120,12 +120,12 @@ TEST_F(Limited, AWallOfEveryLawIsSetWithAllThatItHas) {
 
 TEST_F(Limited, ALimitThatTheDeviceRefusesChangesNothing) {
   limits.force_limit = -1.0;
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { begin(RigAxes::wall_along); }), "force.limit");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { begin(RigAxes::wall_along); }), "force.limit");
   expect_restored();
 }
 
 TEST_F(Limited, WhatIsRefusedLaterLeavesTheLimitsUntilTheEnd) {
-  EXPECT_THROW(begin().set({-1.0}), device::ValueError);
+  EXPECT_THROW(begin().set({-1.0}), base::ValueError);
   EXPECT_EQ(values()[0], 2.0);
   expect_restored();
 }

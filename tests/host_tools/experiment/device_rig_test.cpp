@@ -139,7 +139,7 @@ TEST_F(JitterOverASlowLink, OneThatAlwaysLosesSomeIsNotCountedAndIsTold) {
 double served_jitter(double background, double activation_gain) {
   simulation::Scene scene = simulated_board::open_scene("paper1_jitter");
   scene.axes[0].person->activation_gain = activation_gain;
-  device::Device device(std::make_unique<link::SimLink>(scene));
+  device::Device device(std::make_unique<device::SimLink>(scene));
   JitterSettings settings;
   settings.touches = 6;
   settings.wall.window = 1.5;

@@ -23,9 +23,9 @@ class StandstillTest : public TouchedBoard {
   }
   Fault fault(std::size_t axis) { return device::fault_of(device::Drive(device, axis).status()); }
 
-  const device::DeviceError any_error{"the axis lost its force"};
-  const link::LinkError no_answer{"no answer"};
-  const device::StoodStill stopped{"this program was stopped"};
+  const base::DeviceError any_error{"the axis lost its force"};
+  const device::LinkError no_answer{"no answer"};
+  const base::StoodStill stopped{"this program was stopped"};
 };
 
 TEST_F(StandstillTest, ASilenceThatTrippedIsClearedAndTold) {
@@ -171,7 +171,7 @@ TEST_F(DisturbedTouches, OneOfThemIsMadeAgainAndMeasuresTheSame) {
 
 TEST_F(DisturbedTouches, WhatNeverEndsIsToldAfterTheThirdRepetition) {
   stall = {Stall::Of::program, 40, [](int) { return true; }};
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }),
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run_contacts(); }),
                   "axis 0 lost its force during the touch: the host was silent for longer than link.timeout");
   EXPECT_EQ(touches, 1 + most_standstills);
   EXPECT_EQ(notices.size(), static_cast<std::size_t>(most_standstills));
@@ -179,7 +179,7 @@ TEST_F(DisturbedTouches, WhatNeverEndsIsToldAfterTheThirdRepetition) {
   touches = 0;
   ASSERT_TRUE(device::Drive(device, 0).clear());
   stall.of = Stall::Of::link;
-  EXPECT_CONTAINS(thrown_message<link::LinkError>([&] { run_contacts(); }), "no answer");
+  EXPECT_CONTAINS(thrown_message<device::LinkError>([&] { run_contacts(); }), "no answer");
   EXPECT_EQ(touches, 1 + most_standstills);
   expect_left_in_order();
 }
@@ -197,7 +197,7 @@ TEST_F(DisturbedTouches, NoOtherErrorIsRepeated) {
     if (touches == 2 && text.find("holding") != std::string::npos)
       simulation().device().connect_encoder(0, false);
   };
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }), "encoder");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run_contacts(); }), "encoder");
   EXPECT_EQ(touches, 2);
   EXPECT_TRUE(notices.empty());
   expect_left_in_order();
@@ -213,7 +213,7 @@ TEST_F(DisturbedTouches, NeitherIsWhatTheUserOrAnotherProgramStops) {
   report = [&](const std::string& text) {
     if (touches == 4 && text.find("holding") != std::string::npos) device::Drive(device, 0).stop();
   };
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run_contacts(); }), "Quick stop");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run_contacts(); }), "Quick stop");
   EXPECT_EQ(touches, 4);
   EXPECT_TRUE(notices.empty());
 }

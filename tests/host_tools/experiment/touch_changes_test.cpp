@@ -115,7 +115,7 @@ TEST(TouchChanges, BadValuesAreRefusedWithTheRange) {
   EXPECT_CONTAINS(refusal("haptic.rate=333"), "divide the tick rate");
   EXPECT_CONTAINS(refusal("wall.adaptive_force_min=3"), "wall.adaptive_force_min");
   EXPECT_CONTAINS(refusal("wall.damping"), "NAME=VALUE");
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([] {
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] {
                     TouchChanges({"wall.damping=1", "wall.damping=2"}, Touching::device);
                   }),
                   "given twice");
@@ -137,7 +137,7 @@ TEST(WallAssignments, ChangesTakeThePlaceOfWhatTheWallSays) {
 
 TEST(TouchChanges, ALawIsChangedOnlyWhereTheExperimentDoesNotVaryIt) {
   const Texts law = {"wall.law=adaptive", "wall.adaptive_mode=latched"};
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { TouchChanges(law, Touching::device); }),
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { TouchChanges(law, Touching::device); }),
                   "it is what the experiment compares");
   const TouchChanges changes(law, Touching::device, Varied::stiffness_and_speeds);
   EXPECT_EQ(changes.assignments(), law);
@@ -145,7 +145,7 @@ TEST(TouchChanges, ALawIsChangedOnlyWhereTheExperimentDoesNotVaryIt) {
   changes.apply(setup);
   EXPECT_EQ(setup.wall.wall.kind, control::WallKind::adaptive);
   EXPECT_EQ(setup.wall.wall.adaptive.mode, control::AdaptiveMode::latched);
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([] {
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([] {
                     TouchChanges({"motion.approach_speed=1"}, Touching::simulated_person,
                                  Varied::stiffness_and_speeds);
                   }),

@@ -85,8 +85,8 @@ TEST_F(TouchJournal, NobodyIsAskedThreeTimesAndWithoutAPrompterOnce) {
 }
 
 TEST_F(TouchJournal, AnyOtherErrorIsTheCallersAndNothingIsKept) {
-  once = []() -> Counted { throw device::DeviceError("fault"); };
-  EXPECT_THROW(touch("a", &person), device::DeviceError);
+  once = []() -> Counted { throw base::DeviceError("fault"); };
+  EXPECT_THROW(touch("a", &person), base::DeviceError);
   EXPECT_EQ(journal->size(), 0u);
 }
 

@@ -116,7 +116,7 @@ class StalledBoard : public TouchedBoard {
   [[noreturn]] void lose() {
     --unanswered_;
     if (stall.of == Stall::Of::link) cable().sim.wait(std::chrono::milliseconds(1500));
-    throw link::LinkError("no answer");
+    throw device::LinkError("no answer");
   }
 
   bool was_on_ = false;

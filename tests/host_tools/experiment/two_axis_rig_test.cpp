@@ -114,7 +114,7 @@ TEST_F(DeviationDevice, AHandThatComesBeforeTheRecordingBeganIsAskedToGoBack) {
 }
 
 DeviationRun served(const simulation::Scene& scene, const DeviationSettings& settings) {
-  device::Device device(std::make_unique<link::SimLink>(scene));
+  device::Device device(std::make_unique<device::SimLink>(scene));
   device.apply(device::parse_assignments({"axis1.wall.law=none"}));
   const ReportText nobody = [](const std::string&) {};
   DeviceRig rig(device, deviation_limits(), {nullptr, nullptr, nobody, nobody}, RigAxes::wall_along);
@@ -203,7 +203,7 @@ TEST_F(DeviationDisturbed, AFaultOfTheSecondAxisIsNotRepeated) {
     if (touches == 1 && text.find(" of ") != std::string::npos)
       simulation().device().connect_encoder(1, false);
   };
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(); }), "axis 1 lost its force");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run(); }), "axis 1 lost its force");
   EXPECT_EQ(touches, 1);
   EXPECT_TRUE(notices.empty());
   expect_disarmed_and_restored();

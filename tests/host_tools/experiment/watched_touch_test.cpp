@@ -145,7 +145,7 @@ TEST_F(Watched, ALostLinkEndsInAnErrorAndTheDeviceRemovesTheForce) {
     forceful_then = forceful();
     cable().cut = true;
   };
-  EXPECT_CONTAINS(thrown_message<link::LinkError>([&] { touch(); }), "the cable is gone");
+  EXPECT_CONTAINS(thrown_message<device::LinkError>([&] { touch(); }), "the cable is gone");
   EXPECT_TRUE(forceful_then);
   EXPECT_TRUE(forceful());  // nobody can tell the device
   cable().sim.wait(std::chrono::milliseconds(1100));
@@ -226,7 +226,7 @@ TEST_F(WatchedSpringyHand, StaysWithinItsBoundUnderForce) {
 // removed the force.
 TEST_F(WatchedSpringyHand, WhatItDoesAfterItsForceWasRemovedUnseenIsNoOscillation) {
   stall = {Stall::Of::program, 30, [](int) { return true; }};
-  const auto what = thrown_message<device::DeviceError>([&] { watch_touch(device, watch, report); });
+  const auto what = thrown_message<base::DeviceError>([&] { watch_touch(device, watch, report); });
   EXPECT_CONTAINS(what, "lost its force during the touch: the host was silent");
   expect_disarmed();
 }
@@ -240,7 +240,7 @@ TEST_F(WatchedSpringyHand, WhatItDidUnderForceIsOneWhateverCameAfterwards) {
     try {
       if (!watch_touch(device, watch, report).aborted_at) continue;
       tripped += device.read_number("drive.error_code") == 0x8130 ? 1 : 0;
-    } catch (const device::DeviceError&) {
+    } catch (const base::DeviceError&) {
       // The records of the swing were overwritten.
     }
     expect_disarmed();

@@ -26,12 +26,13 @@ class CommandLineFixture : public testing::Test {
     setenv("XDG_CONFIG_HOME", folder.path().c_str(), 1);
   }
 
-  virtual std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) = 0;
+  virtual std::unique_ptr<device::Link> open_device(const std::string& address,
+                                                    const device::Notice& notice) = 0;
   /// What else a command reaches of this computer.
   virtual void prepare(Context&) {}
 
   int kmax(std::vector<std::string> arguments) {
-    return kmax(std::move(arguments), [this](const std::string& address, const link::Notice& notice) {
+    return kmax(std::move(arguments), [this](const std::string& address, const device::Notice& notice) {
       return open_device(address, notice);
     });
   }
@@ -82,8 +83,9 @@ class CommandLineFixture : public testing::Test {
 /// The whole program in process, with the links that it really has.
 class SimulatedCommandLine : public CommandLineFixture {
  protected:
-  std::unique_ptr<link::Link> open_device(const std::string& address, const link::Notice& notice) override {
-    return link::open_link(link::parse_device_address(address), notice);
+  std::unique_ptr<device::Link> open_device(const std::string& address,
+                                            const device::Notice& notice) override {
+    return device::open_link(device::parse_device_address(address), notice);
   }
 };
 

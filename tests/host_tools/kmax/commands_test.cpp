@@ -52,7 +52,7 @@ class Commands : public testing::Test {
 
   std::ostringstream out, messages;
   Context context{out, messages,
-                  [](const std::string&, const link::Notice&) { return std::unique_ptr<link::Link>(); }};
+                  [](const std::string&, const device::Notice&) { return std::unique_ptr<device::Link>(); }};
 };
 
 // Whoever copies a line out of the help, comment and all, must not have a comment in the command.

@@ -14,7 +14,7 @@ class Completion : public SimulatedCommandLine {
  protected:
   Words of(Words words) {
     words.insert(words.begin(), {"complete", "--"});
-    EXPECT_EQ(kmax(words), done);
+    EXPECT_EQ(kmax(words), base::done);
     Words found;
     std::istringstream lines(output);
     for (std::string line; std::getline(lines, line);) found.push_back(line);
@@ -48,7 +48,7 @@ TEST_F(Completion, CommandsOptionsParametersChoicesAndScenes) {
 
 // As bash itself calls it: it breaks words at '=' and ':'.
 TEST_F(Completion, BashCompletesValuesAndAddresses) {
-  ASSERT_EQ(kmax({"completion", "bash"}), done);
+  ASSERT_EQ(kmax({"completion", "bash"}), base::done);
   folder.write("script", output);
   folder.write("kmax", "#!/bin/bash\n[ \"$*\" = 'complete -- set wall.law=pl' ] && echo wall.law=plain\n");
   const std::string command =
@@ -63,13 +63,13 @@ TEST_F(Completion, BashCompletesValuesAndAddresses) {
 }
 
 TEST_F(Completion, PagesOfAllCommands) {
-  ASSERT_EQ(kmax({"manual", folder.path().string(), "--json"}), done) << said;
+  ASSERT_EQ(kmax({"manual", folder.path().string(), "--json"}), base::done) << said;
   const auto pages = document()["pages"];
   EXPECT_GT(pages.size(), 35u);
   EXPECT_EQ(folder.entries(), pages.size());
   EXPECT_CONTAINS(folder.read("kmax-experiment-contact.1"),
                   ".SH SYNOPSIS\nkmax experiment contact [OPTIONS]\n");
-  expect_error({"manual", in("missing")}, failed, "missing");
+  expect_error({"manual", in("missing")}, base::failed, "missing");
 }
 
 }  // namespace kmax::cli::completion_test

@@ -22,13 +22,13 @@ class HelpText : public testing::Test {
 
   std::ostringstream out, messages;
   Context context{out, messages,
-                  [](const std::string&, const link::Notice&) { return std::unique_ptr<link::Link>(); }};
+                  [](const std::string&, const device::Notice&) { return std::unique_ptr<device::Link>(); }};
   CLI::App app;
 };
 
 TEST_F(HelpText, FitsIntoEightyColumnsButForAnExampleThatCannotBeBroken) {
   for_each_command([](const CLI::App& command) {
-    for (const std::string& line : lines_of(help_text(command, 80), 1000))
+    for (const std::string& line : base::lines_of(help_text(command, 80), 1000))
       EXPECT_LE(line.size(), 80u) << line;
   });
 }

@@ -14,7 +14,7 @@ class WiredCommandLine : public CommandLineFixture {
   enum class Loss { request, reply };
 
   /// What the device's link is to a command; it follows the device to another unit.
-  class Wire final : public link::RegisterLink {
+  class Wire final : public device::RegisterLink {
    public:
     explicit Wire(WiredCommandLine& test) : test_(test) {}
 
@@ -30,7 +30,7 @@ class WiredCommandLine : public CommandLineFixture {
       if (!lost || test_.loss == Loss::reply) test_.device->write_holding(address, values);
       if (!lost) return;
       wait(std::chrono::milliseconds(500));
-      throw link::LinkError("no answer");
+      throw device::LinkError("no answer");
     }
     std::map<std::string, std::string> identify() override { return test_.device->identify(); }
     void follow_serial_settings(std::optional<std::uint8_t> unit,
@@ -48,7 +48,7 @@ class WiredCommandLine : public CommandLineFixture {
     int unit_ = test_.device->read_holding(device::Parameter::of<"modbus.unit">().address(), 1).front();
   };
 
-  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+  std::unique_ptr<device::Link> open_device(const std::string&, const device::Notice&) override {
     ++connections;
     return std::make_unique<Wire>(*this);
   }
@@ -58,7 +58,8 @@ class WiredCommandLine : public CommandLineFixture {
     return CommandLineFixture::kmax(std::move(arguments));
   }
 
-  std::shared_ptr<link::SimLink> device = std::make_shared<link::SimLink>(simulated_board::factory_scene());
+  std::shared_ptr<device::SimLink> device =
+      std::make_shared<device::SimLink>(simulated_board::factory_scene());
   Loss loss = Loss::request;
   int first_lost_write = 0, last_lost_write = 0;  ///< of one connection, counted from 1; 0: none
   int connections = 0;

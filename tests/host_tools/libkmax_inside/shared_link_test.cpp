@@ -12,7 +12,7 @@ namespace kmax::library::shared_link_test {
 using namespace std::chrono_literals;
 
 /// Notes what it is asked for. A loan takes as long as another program may keep it.
-class NotedLink final : public link::Link {
+class NotedLink final : public device::Link {
  public:
   explicit NotedLink(std::vector<std::string>& done) : done_(done) {}
 
@@ -20,7 +20,7 @@ class NotedLink final : public link::Link {
     done_.emplace_back("read");
     return std::vector<std::uint32_t>(slots.size());
   }
-  void write(std::span<const link::SlotValue> /*values*/, link::Repeat /*repeat*/,
+  void write(std::span<const device::SlotValue> /*values*/, device::Repeat /*repeat*/,
              const std::function<void()>& /*before_request*/) override {}
   std::vector<std::uint32_t> read_trace(std::size_t /*first*/, std::size_t /*count*/) override { return {}; }
   std::vector<std::uint32_t> read_capture(std::size_t /*count*/, const Progress& /*progress*/) override {
@@ -29,7 +29,7 @@ class NotedLink final : public link::Link {
   std::vector<std::uint32_t> read_log_entry(std::size_t /*place*/) override { return {}; }
   void wait(std::chrono::microseconds /*duration*/) override {
     done_.emplace_back("lent");
-    std::this_thread::sleep_for(link::PeriodicYield::own_time);
+    std::this_thread::sleep_for(device::PeriodicYield::own_time);
   }
   std::string description() const override { return "noted"; }
 
@@ -64,13 +64,13 @@ TEST_F(SharedLinkLends, NotTwiceInARow) {
 }
 
 TEST_F(SharedLinkLends, BetweenReadingsWithoutAPause) {
-  std::this_thread::sleep_for(link::PeriodicYield::own_time);
+  std::this_thread::sleep_for(device::PeriodicYield::own_time);
   read();
   EXPECT_EQ(done_, (Done{"lent", "read"}));
 }
 
 TEST_F(SharedLinkLends, NotBeforeTheForceIsTakenAway) {
-  std::this_thread::sleep_for(link::PeriodicYield::own_time);
+  std::this_thread::sleep_for(device::PeriodicYield::own_time);
   const Uninterrupted uninterrupted;
   read();
   EXPECT_EQ(done_, (Done{"read"}));
@@ -78,7 +78,7 @@ TEST_F(SharedLinkLends, NotBeforeTheForceIsTakenAway) {
 
 TEST_F(SharedLinkLends, NotBetweenReadingsIfThatIsSwitchedOff) {
   link_.set_lending(false);
-  std::this_thread::sleep_for(link::PeriodicYield::own_time);
+  std::this_thread::sleep_for(device::PeriodicYield::own_time);
   read();
   EXPECT_EQ(done_, (Done{"read"}));
 }

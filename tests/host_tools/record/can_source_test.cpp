@@ -15,15 +15,15 @@ using drivers::CanFrame;
 using std::chrono::microseconds;
 
 /// A bus on which frames wait, and which keeps what is sent.
-class FakePort final : public link::CanPort {
+class FakePort final : public device::CanPort {
  public:
   void send(const CanFrame& frame) override { sent.push_back(frame); }
-  std::optional<link::Received> receive(microseconds wait) override {
+  std::optional<device::Received> receive(microseconds wait) override {
     if (waiting.empty()) {
       std::this_thread::sleep_for(std::min(wait, microseconds(1000)));
       return std::nullopt;
     }
-    const link::Received next = waiting.front();
+    const device::Received next = waiting.front();
     waiting.pop_front();
     return next;
   }
@@ -40,7 +40,7 @@ class FakePort final : public link::CanPort {
            {0, 0, 0, 0, 0, 0, static_cast<std::uint8_t>(tick & 0xFF), static_cast<std::uint8_t>(tick >> 8)});
   }
 
-  std::deque<link::Received> waiting;
+  std::deque<device::Received> waiting;
   std::vector<CanFrame> sent;
   std::string troubles;
 };
@@ -100,7 +100,7 @@ TEST(CanSource, ARestartEndsTheRecordingAndIsNotPutBack) {
     EXPECT_FALSE(source.next(microseconds(1000)));
     port.arrive(0x705, 1, {0});
     EXPECT_CONTAINS(
-        host_tools_test::thrown_message<device::DeviceError>([&] { source.next(microseconds(1000)); }),
+        host_tools_test::thrown_message<base::DeviceError>([&] { source.next(microseconds(1000)); }),
         "node 5 has restarted");
   }
   EXPECT_EQ(port.sent, std::vector<CanFrame>{nmt(1)});
@@ -111,7 +111,7 @@ TEST(CanSource, SilenceEndsTheRecordingAndSaysWhatTheBusSays) {
   port.troubles = "nobody acknowledges";
   CanSource source(port, plan_in(127));
   port.arrive(0x185, 3);
-  const std::string message = host_tools_test::thrown_message<link::LinkError>([&] {
+  const std::string message = host_tools_test::thrown_message<device::LinkError>([&] {
     while (true) source.next(microseconds(50'000));
   });
   EXPECT_CONTAINS(message, "fake0: no complete set of PDOs from node 5 for 1 s");
@@ -180,7 +180,7 @@ TEST(CanSource, PdosThatNeverMakeASetEndItToo) {
         0x485, 8,
         {0, 0, 0, 0, 0, 0, static_cast<std::uint8_t>(20 * i), static_cast<std::uint8_t>(20 * i >> 8)});
   }
-  EXPECT_CONTAINS(host_tools_test::thrown_message<link::LinkError>([&] {
+  EXPECT_CONTAINS(host_tools_test::thrown_message<device::LinkError>([&] {
                     while (true) source.next(microseconds(50'000));
                   }),
                   "no complete set of PDOs");
@@ -200,7 +200,7 @@ TEST(CanSource, ItsOwnAbsenceIsNoSilence) {
 }
 
 TEST(CanSource, TheFiltersPassWhatItNeeds) {
-  const link::CanPortOptions options = port_options(plan_in(5));
+  const device::CanPortOptions options = port_options(plan_in(5));
   ASSERT_EQ(options.filters.size(), 5u);
   EXPECT_EQ(options.filters[3].identifier, 0x485u);
   EXPECT_EQ(options.filters[4].identifier, 0x705u);

@@ -22,7 +22,7 @@ class PdoPlanTest : public testing::Test {
     return read_pdo_plan(device, 9);
   }
   std::string refusal() {
-    return host_tools_test::thrown_message<device::DeviceError>([this] { read(); });
+    return host_tools_test::thrown_message<base::DeviceError>([this] { read(); });
   }
   TelemetryRequest of_fake() {
     return TelemetryRequest(
@@ -143,7 +143,7 @@ TEST_F(PdoPlanTest, ARequestThatIsCutShortAnywhereIsPutBackToo) {
     TelemetryRequest request = of_fake();
     try {
       whole = request.ask();
-    } catch (const link::LinkError&) {
+    } catch (const device::LinkError&) {
       halves += event_times() != factory ? 1 : 0;
     }
     lost_requests_from = 0;

@@ -20,7 +20,7 @@ class PolledSourceTest : public testing::Test {
   }
   std::shared_ptr<FakeDevice> fake = std::make_shared<FakeDevice>();
   FakeLink* link = new FakeLink(fake);
-  device::Device device{std::unique_ptr<link::Link>(link)};
+  device::Device device{std::unique_ptr<device::Link>(link)};
 };
 
 TEST_F(PolledSourceTest, ARowHasTheAxesValuesAndTheirTicks) {
@@ -79,7 +79,7 @@ TEST_F(PolledSourceTest, ARestartEndsIt) {
   set_tick(1000);
   source.next(any_time);
   set_tick(3);
-  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { source.next(any_time); }),
+  EXPECT_CONTAINS(host_tools_test::thrown_message<base::DeviceError>([&] { source.next(any_time); }),
                   "restarted");
 }
 

@@ -14,7 +14,7 @@ class MadeUpSource final : public RowSource {
  public:
   std::optional<Row> next(std::chrono::microseconds) override {
     if (++asked % 3 == 0) return std::nullopt;
-    if (asked > fails_after) throw link::LinkError("gone");
+    if (asked > fails_after) throw device::LinkError("gone");
     tick += 20;
     return Row{.tick = tick};
   }
@@ -59,7 +59,7 @@ TEST(Recording, KeepsWhatCameBeforeAnError) {
   source.fails_after = 10;
   std::ostringstream out;
   RecordingProgress progress;
-  EXPECT_THROW(record(source, out, csv, std::nullopt, never, progress), link::LinkError);
+  EXPECT_THROW(record(source, out, csv, std::nullopt, never, progress), device::LinkError);
   EXPECT_EQ(progress.rows, 7u);
   const std::string text = out.str();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 8);

@@ -57,7 +57,7 @@ RC_GTEST_PROP(TerminalTextProperty, ColumnsBeginWhereTheirHeadingsDo, ()) {
   std::getline(lines, line);
   const std::size_t second = line.find("second");
   std::getline(lines, line);
-  while (std::getline(lines, line)) RC_ASSERT(cli::display_width(line.substr(0, line.find('|'))) == second);
+  while (std::getline(lines, line)) RC_ASSERT(base::display_width(line.substr(0, line.find('|'))) == second);
 }
 
 RC_GTEST_PROP(TerminalTextProperty, AnyBytesGiveALinePerRow, (const std::vector<std::string>& cells)) {

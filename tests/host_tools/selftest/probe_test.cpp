@@ -32,7 +32,7 @@ double current_after_arming(TestedAxis& tested, const std::string& kind) {
   try {
     drive.arm();
     tested.link->wait(std::chrono::milliseconds(100));
-  } catch (const device::DeviceError&) {
+  } catch (const base::DeviceError&) {
     // It trips.
   }
   drive.disarm();

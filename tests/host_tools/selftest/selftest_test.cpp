@@ -173,7 +173,7 @@ TEST(SelfTest, AnAxisWithItsForceOnIsLeftAlone) {
   TestedAxis tested("dc_coreless_a");
   device::Drive drive(*tested.device, 0);
   drive.arm();
-  EXPECT_THROW(tested.run(), device::DeviceError);
+  EXPECT_THROW(tested.run(), base::DeviceError);
   EXPECT_TRUE(drive.status().armed());
   drive.disarm();
 }

@@ -18,7 +18,7 @@
 namespace kmax::selftest {
 
 /// A link to the simulated board that looks at the true handle in every tick.
-class WatchedLink final : public link::FrameLink {
+class WatchedLink final : public device::FrameLink {
  public:
   WatchedLink(const simulation::Scene& scene, std::size_t axis) : FrameLink(1), board_(scene), axis_(axis) {
     start_ = position();
@@ -55,15 +55,16 @@ class WatchedLink final : public link::FrameLink {
     board_.board().advance(1);
     largest_ = std::max(largest_, std::abs(position() - start_));
   }
-  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame, link::Repeat /*repeat*/) override {
+  std::vector<std::uint8_t> exchange(std::span<const std::uint8_t> frame,
+                                     device::Repeat /*repeat*/) override {
     if (held_up) wait(held_up());
     if (cut_) {
       wait(std::chrono::milliseconds(100));
-      throw link::LinkError("no answer");
+      throw device::LinkError("no answer");
     }
     if (lose_every_ != 0 && ++messages_ % lose_every_ == 0) {
       wait(std::chrono::milliseconds(100));
-      throw link::LinkError("lost");
+      throw device::LinkError("lost");
     }
     board_.board().receive(frame, without_parity);
     for (int tries = 0; tries < 20000; ++tries) {
@@ -71,7 +72,7 @@ class WatchedLink final : public link::FrameLink {
       const std::vector<std::uint8_t> reply = board_.board().transmitted();
       if (reply.size() > 3) return reply;
     }
-    throw link::LinkError("no answer");
+    throw device::LinkError("no answer");
   }
 
   simulated_board::SimulatedBoard board_;

@@ -57,8 +57,8 @@ TEST_F(ConversationTest, SaveIsWhatARevertGoesBackToFromThenOn) {
 
 TEST_F(ConversationTest, WhatAnotherProgramSetsIsSeen) {
   Conversation talk(reach, commands, analysis, mirror, publish);
-  const link::SlotValue value{Parameter::of<"wall.damping">(1).slot(), std::bit_cast<std::uint32_t>(2.5F)};
-  watched.device.write({&value, 1}, link::Repeat::never);
+  const device::SlotValue value{Parameter::of<"wall.damping">(1).slot(), std::bit_cast<std::uint32_t>(2.5F)};
+  watched.device.write({&value, 1}, device::Repeat::never);
   until(talk, "parameters", [](const Json& m) { return m["values"]["axis1.wall.damping"]["value"] == 2.5; });
 }
 
@@ -171,8 +171,8 @@ TEST_F(ConversationTest, ACaptureIsReadInTheEnd) {
 // A node sends a capture in one transfer, and hears no sign of life meanwhile.
 TEST_F(ConversationTest, OverCanALongCaptureAndAnArmedAxisExcludeEachOther) {
   commands.joined(1);
-  reach.open_bus = [](const auto&) -> std::unique_ptr<link::CanPort> {
-    throw device::DeviceError("this bus carries no rows");
+  reach.open_bus = [](const auto&) -> std::unique_ptr<device::CanPort> {
+    throw base::DeviceError("this bus carries no rows");
   };
   Conversation talk(reach, commands, analysis, mirror, publish);
   move_the_wall_away(talk);
@@ -271,7 +271,7 @@ TEST_F(ConversationTest, TheEndWhileTheLinkIsLostTriesOnceMoreAndSaysWhatBecomes
       };
       const std::string message =
           back_in_time ? (session.run(ended), "")
-                       : host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); });
+                       : host_tools_test::thrown_message<base::DeviceError>([&] { session.run(ended); });
       EXPECT_EQ(armed(0), !back_in_time);
       if (!back_in_time) {
         EXPECT_CONTAINS(message, "nobody answers");
@@ -294,11 +294,11 @@ TEST_F(ConversationTest, TheEndDisarmsEveryAxisEvenIfOneFails) {
   const auto ended = [&] {
     if (!armed(1)) return published.size() > 10'000;
     watched.before_request = [&] {
-      if (watched.requests.back().starts_with("word 0 ")) throw link::LinkError("axis 0 is not reached");
+      if (watched.requests.back().starts_with("word 0 ")) throw device::LinkError("axis 0 is not reached");
     };
     return true;
   };
-  EXPECT_CONTAINS(host_tools_test::thrown_message<device::DeviceError>([&] { session.run(ended); }),
+  EXPECT_CONTAINS(host_tools_test::thrown_message<base::DeviceError>([&] { session.run(ended); }),
                   "axis 0 is not reached");
   EXPECT_TRUE(armed(0));
   EXPECT_FALSE(armed(1));
@@ -325,7 +325,7 @@ TEST_F(ConversationTest, AStopDuringTheEndDoesNotKeepItFromDisarming) {
 
 TEST_F(ConversationTest, ADeviceThatIsNotThereAtFirstIsAnError) {
   watched.lost = true;
-  EXPECT_CONTAINS(host_tools_test::thrown_message<link::LinkError>(
+  EXPECT_CONTAINS(host_tools_test::thrown_message<device::LinkError>(
                       [&] { DeviceSession(reach, {}, commands, analysis, publish); }),
                   "nobody answers");
 }

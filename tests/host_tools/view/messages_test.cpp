@@ -92,7 +92,7 @@ std::map<std::string, Json> all_that_is_heard() {
   CommandQueue commands;
   commands.joined(1);
   Analysis analysis(check::choose_hand("none"), publish);
-  const Reach reach{.address = "sim", .open_link = [] { return link::make_sim_link(); }};
+  const Reach reach{.address = "sim", .open_link = [] { return device::make_sim_link(); }};
   DeviceSession session(reach, {}, commands, analysis, publish);
   commands.push({.kind = Kind::map, .map_side = "wall.damping", .client = 1});
   commands.push({.kind = Kind::capture, .capture = {.channels = {"force"}, .samples = 1000}, .client = 1});

@@ -268,11 +268,11 @@ TEST_F(ProcedureTest, AStopIsTheNextRequestOfAContactAndNothingArmsAfterIt) {
 
 // What was going on might go on, had it not noticed.
 TEST_F(ProcedureTest, BetweenAStopAndItsSettlementNothingCanArm) {
-  link::SimLink link{simulated_board::factory_scene()};
+  device::SimLink link{simulated_board::factory_scene()};
   ForceRemoval removal(link, commands);
-  device::Device device(link::make_sim_link());
+  device::Device device(device::make_sim_link());
   const auto word = [](std::uint32_t raw) {
-    return std::vector{link::SlotValue{device::Parameter::of<"drive.controlword">(1).slot(), raw}};
+    return std::vector{device::SlotValue{device::Parameter::of<"drive.controlword">(1).slot(), raw}};
   };
   EXPECT_NO_THROW(removal.refuse_to_arm(word(0xF)));
   commands.push({.kind = Kind::stop});

@@ -23,20 +23,20 @@ inline constexpr std::uint32_t quick_stop = 2;  // CiA 402
 struct Watched {
   explicit Watched(const simulation::Scene& scene) : device(scene) {}
 
-  link::SimLink device;
+  device::SimLink device;
   std::vector<std::string> requests;  ///< "read", "write" or "word A V": controlword V of axis A
   std::function<void()> before_request;
   bool lost = false;
   int loans = 0;  ///< how often others could use the link
 
   void request(std::string what) {
-    if (lost) throw link::LinkError("nobody answers");
+    if (lost) throw device::LinkError("nobody answers");
     requests.push_back(std::move(what));
     if (before_request) before_request();
   }
 };
 
-class WatchedLink final : public link::Link {
+class WatchedLink final : public device::Link {
  public:
   explicit WatchedLink(Watched& watched) : watched_(watched) {}
 
@@ -44,7 +44,7 @@ class WatchedLink final : public link::Link {
     watched_.request("read");
     return watched_.device.read(slots);
   }
-  void write(std::span<const link::SlotValue> values, link::Repeat repeat,
+  void write(std::span<const device::SlotValue> values, device::Repeat repeat,
              const std::function<void()>& before_request) override {
     // Only over CAN can they be written.
     if (device::Parameter::at(values[0].slot).name().find("event_time") != std::string::npos) return;
@@ -136,7 +136,7 @@ class ConversationTest : public testing::Test {
 
   Watched watched;
   Reach reach{.address = "watched", .open_link = [this] {
-                if (watched.lost) throw link::LinkError("nobody answers");
+                if (watched.lost) throw device::LinkError("nobody answers");
                 return std::make_unique<WatchedLink>(watched);
               }};
   CommandQueue commands;

@@ -156,7 +156,8 @@ TEST(ImageFaultLog, NamesTheCrashOnceAndWhereItWas) {
 TEST(ImageFaultLog, AResetInTheMiddleOfAnEntryLeavesItWholeOrOut) {
   Bench bench;
   std::size_t entries = 0, with = 0, without = 0;
-  const ElfSymbol log_memory = tests::image().required_symbol("_ZN4kmax5board12_GLOBAL__N_110log_memoryE");
+  const base::ElfSymbol log_memory =
+      tests::image().required_symbol("_ZN4kmax5board12_GLOBAL__N_110log_memoryE");
   const auto memory = bench.board->bus().memory(log_memory.address, log_memory.size);
   // Later each time, from its first store on to behind the ticks of both axes, which may come in between.
   constexpr double step = 0.7e-6;

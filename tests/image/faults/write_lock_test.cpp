@@ -27,7 +27,7 @@ class Bench : public CanBench {
     const std::size_t count = firmware::register_count(firmware::entry_at(entry).type);
     try {
       master->write_holding(firmware::register_address(entry, 0), std::span(words).last(count));
-    } catch (const link::RegisterRefused& refused) {
+    } catch (const device::RegisterRefused& refused) {
       return refused.exception();
     }
     return 0;
@@ -36,7 +36,7 @@ class Bench : public CanBench {
   Abort write_object(std::uint16_t index, std::uint8_t subindex, std::uint32_t value, std::size_t size) {
     try {
       write(index, subindex, value, size);
-    } catch (const link::SdoAborted& aborted) {
+    } catch (const device::SdoAborted& aborted) {
       return aborted.code();
     }
     return Abort::none;

@@ -23,7 +23,7 @@ class Dictionary : public testing::Test {
   Abort abort_of(std::uint16_t index, std::uint8_t subindex, const std::vector<std::uint8_t>& bytes) {
     try {
       sdo.download({index, subindex}, bytes, false);
-    } catch (const link::SdoAborted& aborted) {
+    } catch (const device::SdoAborted& aborted) {
       return aborted.code();
     }
     return Abort::none;
@@ -31,7 +31,7 @@ class Dictionary : public testing::Test {
   Abort abort_of_reading(std::uint16_t index, std::uint8_t subindex) {
     try {
       sdo.upload({index, subindex});
-    } catch (const link::SdoAborted& aborted) {
+    } catch (const device::SdoAborted& aborted) {
       return aborted.code();
     }
     return Abort::none;
@@ -60,11 +60,11 @@ class Dictionary : public testing::Test {
 
   virtual_board::VirtualBoard board;
   BoardCanPort port;
-  link::SdoClient sdo;
+  device::SdoClient sdo;
 };
 
 std::string place(const DescribedObject& object) {
-  return link::text_of({object.index, object.subindex}) + " " + object.name;
+  return device::text_of({object.index, object.subindex}) + " " + object.name;
 }
 
 /// Whether writing its own value to it does something, or is refused for more than the object itself.
@@ -142,7 +142,7 @@ TEST_F(Dictionary, EveryAbortCodeIsProvoked) {
   // Time-out: an initiated download that is not continued.
   answer_to({0x21, 0x22, 0x58, 1, 20});
   board.run_for(1.1);
-  std::optional<link::Received> late = port.receive(std::chrono::microseconds(1));
+  std::optional<device::Received> late = port.receive(std::chrono::microseconds(1));
   ASSERT_TRUE(late);
   EXPECT_EQ(number_in(late->frame.data, 4), static_cast<std::uint32_t>(Abort::timeout));
   EXPECT_EQ(abort_in(answer_to({0xE0})), Abort::command);

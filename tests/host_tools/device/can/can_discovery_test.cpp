@@ -7,7 +7,7 @@
 #include "tests/host_tools/device/can/fake_sdo_node.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::can_discovery_test {
+namespace kmax::device::can_discovery_test {
 
 using drivers::CanFrame;
 using host_tools_test::FakeSdoNode;
@@ -171,4 +171,4 @@ TEST(CanDiscovery, ABusThatIsClosedMeanwhile) {
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { discover_nodes(node.path(), quick()); }), "closed");
 }
 
-}  // namespace kmax::link::can_discovery_test
+}  // namespace kmax::device::can_discovery_test

@@ -5,7 +5,7 @@
 
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::can_faults_test {
+namespace kmax::device::can_faults_test {
 
 can_frame report(canid_t classes, std::uint8_t controller = 0, std::uint8_t violation = 0) {
   can_frame frame{};
@@ -85,4 +85,4 @@ TEST(CanFaults, AGoodFrameOrARecoveryEndsTheRest) {
   EXPECT_EQ(faults.words("can0"), "");
 }
 
-}  // namespace kmax::link::can_faults_test
+}  // namespace kmax::device::can_faults_test

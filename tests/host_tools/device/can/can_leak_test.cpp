@@ -15,7 +15,7 @@
 #include "tests/host_tools/device/can/fake_sdo_server.hpp"
 #include "tests/host_tools/temporary_folder.hpp"
 
-namespace kmax::link::can_leak_test {
+namespace kmax::device::can_leak_test {
 
 using device::Parameter;
 using host_tools_test::FakeSdoServer;
@@ -116,4 +116,4 @@ TEST(CanLeak, AHundredLinksAndRefusals) {
   EXPECT_LE(open_descriptors(), descriptors + 2);
 }
 
-}  // namespace kmax::link::can_leak_test
+}  // namespace kmax::device::can_leak_test

@@ -14,7 +14,7 @@
 #include "tests/host_tools/device/can/sdo_bench.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::can_link_test {
+namespace kmax::device::can_link_test {
 
 using device::Parameter;
 using drivers::CanFrame;
@@ -115,7 +115,7 @@ TEST(CanLink, ADeviceIsSetAsAWhole) {
   // One value that is not allowed, and none is set.
   const device::Assignment wrong[] = {{Parameter::of<"wall.stiffness">(), 0x3F800000},
                                       {Parameter::of<"wall.damping">(), 0xBF800000}};
-  const auto message = thrown_message<device::ValueError>([&] { device.apply(wrong); });
+  const auto message = thrown_message<base::ValueError>([&] { device.apply(wrong); });
   EXPECT_CONTAINS(message, "wall.damping");
   EXPECT_CONTAINS(message, "nothing was changed");
   EXPECT_EQ(device.read(Parameter::of<"wall.stiffness">()), 0x45000000u);
@@ -183,9 +183,9 @@ TEST(CanLink, WhatItsCallerThrowsBetweenRequestsEndsTheWriting) {
   const SlotValue values[] = {{stiffness.slot(), 0x40000000}, {damping.slot(), 0x40000000}};
   EXPECT_THROW(bench.link().write(values, Repeat::never,
                                   [&] {
-                                    if (++requests == 2) throw device::StoodStill("held up");
+                                    if (++requests == 2) throw base::StoodStill("held up");
                                   }),
-               device::StoodStill);
+               base::StoodStill);
   EXPECT_EQ(read(bench.link(), stiffness), 0x40000000u);
   EXPECT_NE(read(bench.link(), damping), 0x40000000u);
 }
@@ -201,9 +201,9 @@ TEST(CanLink, ItsCallerIsAskedBeforeEachRequestOfArming) {
   answers = 0;
   EXPECT_THROW(link.write({&enabling, 1}, Repeat::never,
                           [&] {
-                            if (answers == 1) throw device::StoodStill("held up");
+                            if (answers == 1) throw base::StoodStill("held up");
                           }),
-               device::StoodStill);
+               base::StoodStill);
   EXPECT_EQ(answers, 1) << "commander";
   answers = 0;
   link.write({&stopping, 1}, Repeat::if_lost);
@@ -372,4 +372,4 @@ TEST(CanLink, ABusThatIsNotThereIsNamed) {
                   "/no/such/bus");
 }
 
-}  // namespace kmax::link::can_link_test
+}  // namespace kmax::device::can_link_test

@@ -12,7 +12,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::can_node_lock_test {
+namespace kmax::device::can_node_lock_test {
 
 using host_tools_test::TemporaryFolder;
 using host_tools_test::thrown_message;
@@ -109,4 +109,4 @@ TEST(CanNodeLock, DisappearsWithAProcessThatIsKilled) {
   close(ready[1]);
 }
 
-}  // namespace kmax::link::can_node_lock_test
+}  // namespace kmax::device::can_node_lock_test

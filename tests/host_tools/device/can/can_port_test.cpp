@@ -8,7 +8,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::can_port_test {
+namespace kmax::device::can_port_test {
 
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
@@ -81,4 +81,4 @@ TEST(KernelFrame, WhatIsNoFrameIsNone) {
   EXPECT_FALSE(from_kernel(kernel));
 }
 
-}  // namespace kmax::link::can_port_test
+}  // namespace kmax::device::can_port_test

@@ -157,7 +157,7 @@ class FakeSdoNode {
   TemporaryFolder folder_;
   Misbehave misbehave_;
   std::string path_;
-  std::optional<link::UnixCanHub> hub_;
+  std::optional<device::UnixCanHub> hub_;
   std::map<std::uint8_t, FakeSdoServer> servers_;
   std::mutex mutex_;
   std::map<std::pair<std::uint16_t, std::uint8_t>, Bytes> values_;

@@ -8,38 +8,39 @@
 namespace kmax::host_tools_test {
 
 /// For what is answered sooner or later: a machine that is busy must not look like a silent node.
-inline link::SdoSettings patient_sdo() {
-  return link::SdoSettings{.response_timeout = std::chrono::seconds(20),
-                           .block_silence = std::chrono::milliseconds(100)};
+inline device::SdoSettings patient_sdo() {
+  return device::SdoSettings{.response_timeout = std::chrono::seconds(20),
+                             .block_silence = std::chrono::milliseconds(100)};
 }
 
 /// For what is never answered. Waited for whenever an answer is lost; a node that a busy machine holds up for
 /// longer is asked once more, which not every test allows.
-inline link::SdoSettings quick_sdo() {
-  link::SdoSettings settings = patient_sdo();
+inline device::SdoSettings quick_sdo() {
+  device::SdoSettings settings = patient_sdo();
   settings.response_timeout = std::chrono::milliseconds(500);
   return settings;
 }
 
 /// Node 5 and its client.
 struct SdoBench {
-  explicit SdoBench(FakeSdoNode::Misbehave misbehave = {}, const link::SdoSettings& settings = patient_sdo())
+  explicit SdoBench(FakeSdoNode::Misbehave misbehave = {},
+                    const device::SdoSettings& settings = patient_sdo())
       : node(std::move(misbehave)), settings_(settings) {}
 
-  link::SdoClient& client() {
+  device::SdoClient& client() {
     if (client_) return *client_;
     node.start();
-    link::CanPortOptions options{.filters = link::SdoClient::filters_for(5)};
-    port = link::open_can_port(node.path(), options);
+    device::CanPortOptions options{.filters = device::SdoClient::filters_for(5)};
+    port = device::open_can_port(node.path(), options);
     return client_.emplace(*port, std::uint8_t{5}, settings_);
   }
 
   FakeSdoNode node;
-  std::unique_ptr<link::CanPort> port;
+  std::unique_ptr<device::CanPort> port;
 
  private:
-  link::SdoSettings settings_;
-  std::optional<link::SdoClient> client_;
+  device::SdoSettings settings_;
+  std::optional<device::SdoClient> client_;
 };
 
 inline FakeSdoNode::Bytes some_bytes(std::size_t count) {

@@ -15,7 +15,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::sdo_client_test {
+namespace kmax::device::sdo_client_test {
 
 using drivers::CanFrame;
 using firmware::canopen::Abort;
@@ -555,4 +555,4 @@ TEST(SdoClientOnFirmware, Aborts) {
   EXPECT_EQ(node.client().upload(number), (SdoClient::Bytes{1, 2, 3, 4}));
 }
 
-}  // namespace kmax::link::sdo_client_test
+}  // namespace kmax::device::sdo_client_test

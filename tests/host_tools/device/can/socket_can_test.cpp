@@ -9,7 +9,7 @@
 #include "host_tools/device/link.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::socket_can_test {
+namespace kmax::device::socket_can_test {
 
 using drivers::CanFrame;
 using host_tools_test::thrown_message;
@@ -149,4 +149,4 @@ TEST_F(SocketCanTest, AnInterfaceThatGoesDownIsToldAndHowToBringItUp) {
   EXPECT_NO_THROW(usable.send(frame_with(1)));
 }
 
-}  // namespace kmax::link::socket_can_test
+}  // namespace kmax::device::socket_can_test

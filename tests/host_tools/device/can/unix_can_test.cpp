@@ -15,7 +15,7 @@
 #include "tests/host_tools/temporary_folder.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::unix_can_test {
+namespace kmax::device::unix_can_test {
 
 using drivers::CanFrame;
 using host_tools_test::TemporaryFolder;
@@ -148,8 +148,8 @@ std::size_t open_descriptors() {
 }
 
 /// A client that is no UnixCan and sends what it likes.
-FileDescriptor raw_client(const std::string& path) {
-  FileDescriptor client(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+base::FileDescriptor raw_client(const std::string& path) {
+  base::FileDescriptor client(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::copy(path.begin(), path.end(), address.sun_path);
@@ -254,7 +254,7 @@ TEST_F(UnixCanHubTest, ItsDescriptorTellsThatThereIsSomethingToDo) {
 
 TEST_F(UnixCanHubTest, WhatIsNoFrameIsCountedAndDropped) {
   UnixCan good(path);
-  const FileDescriptor raw = raw_client(path);
+  const base::FileDescriptor raw = raw_client(path);
   const std::array<std::uint8_t, 40> bytes{0, 8, 0, 0, 8};  // also: an identifier of more than 11 bits
   for (const std::size_t length : {1u, 15u, 16u, 17u, 40u})
     ASSERT_EQ(::send(raw.number(), bytes.data(), length, 0), static_cast<ssize_t>(length));
@@ -276,7 +276,7 @@ TEST(UnixCanHubAlone, WhatACrashedProgramLeftIsReplaced) {
   const TemporaryFolder folder;
   const std::string path = (folder / "bus").string();
   {
-    const FileDescriptor abandoned(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    const base::FileDescriptor abandoned(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::copy(path.begin(), path.end(), address.sun_path);
@@ -334,4 +334,4 @@ TEST(UnixCanHubAlone, TheSocketOfASuccessorIsNotRemoved) {
   EXPECT_TRUE(std::filesystem::exists(path));
 }
 
-}  // namespace kmax::link::unix_can_test
+}  // namespace kmax::device::unix_can_test

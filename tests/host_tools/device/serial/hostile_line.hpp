@@ -15,7 +15,7 @@ namespace kmax::host_tools_test {
 /// A man in the middle of a serial line, in virtual time: between a client and the firmware's own Modbus port
 /// at 115,200 baud. In both directions he delays, doubles, drops, truncates, corrupts and reorders frames,
 /// each with `share` of probability, late by up to `latest`.
-class HostileLine final : public link::ByteLine {
+class HostileLine final : public device::ByteLine {
  public:
   using Bytes = std::vector<std::uint8_t>;
   struct Disturbances {

@@ -7,7 +7,7 @@
 #include "firmware/modbus/server.hpp"
 #include "tests/host_tools/fake_device.hpp"
 
-namespace kmax::link::identification::identification_reply_test {
+namespace kmax::device::identification::identification_reply_test {
 
 std::vector<std::uint8_t> with_crc(std::vector<std::uint8_t> frame) {
   const auto crc = firmware::modbus::crc_of(frame);
@@ -77,4 +77,4 @@ TEST(IdentificationReply, Names) {
   EXPECT_EQ(name_of(128), "object_128");
 }
 
-}  // namespace kmax::link::identification::identification_reply_test
+}  // namespace kmax::device::identification::identification_reply_test

@@ -74,7 +74,7 @@ class PtyDevice {
     const auto length = server.process(pdu, response);
     Bytes frame{request[0]};
     frame.insert(frame.end(), response.begin(), response.begin() + static_cast<std::ptrdiff_t>(length));
-    return link::with_crc(std::move(frame));
+    return device::with_crc(std::move(frame));
   }
 
   void serve() {

@@ -8,7 +8,7 @@
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::register_link_test {
+namespace kmax::device::register_link_test {
 
 using device::all_parameters;
 using device::Parameter;
@@ -85,4 +85,4 @@ TEST(RegisterRefused, AnotherLinksTransactionIsSaidInWords) {
   EXPECT_CONTAINS(std::string(RegisterRefused(6, 16, 0x10).what()), "another link has a transaction open");
 }
 
-}  // namespace kmax::link::register_link_test
+}  // namespace kmax::device::register_link_test

@@ -10,7 +10,7 @@
 #include "tests/host_tools/device/serial/pty_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::serial_link_test {
+namespace kmax::device::serial_link_test {
 
 using device::Parameter;
 using host_tools_test::PtyDevice;
@@ -193,4 +193,4 @@ TEST(SerialLink, FollowsTheDeviceToAnotherRate) {
   EXPECT_EQ(link.read_holding(stiffness, 2), one_thousand);
 }
 
-}  // namespace kmax::link::serial_link_test
+}  // namespace kmax::device::serial_link_test

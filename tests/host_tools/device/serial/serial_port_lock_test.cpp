@@ -9,7 +9,7 @@
 #include "tests/host_tools/device/serial/pty_device.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::serial_port_lock_test {
+namespace kmax::device::serial_port_lock_test {
 
 using host_tools_test::PtyDevice;
 using host_tools_test::thrown_message;
@@ -62,4 +62,4 @@ TEST(SerialPortLock, MissingPermissionNamesTheGroup) {
   EXPECT_CONTAINS(thrown_message<LinkError>([&] { SerialPortLock(device.path(), {}); }), "dialout");
 }
 
-}  // namespace kmax::link::serial_port_lock_test
+}  // namespace kmax::device::serial_port_lock_test

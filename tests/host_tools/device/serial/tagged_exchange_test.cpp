@@ -11,7 +11,7 @@
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/device/serial/hostile_line.hpp"
 
-namespace kmax::link::tagged_exchange_test {
+namespace kmax::device::tagged_exchange_test {
 
 using device::Parameter;
 using host_tools_test::HostileLine;
@@ -247,4 +247,4 @@ TEST(TaggedExchange, ALineThatNeverFallsSilentEnds) {
   }
 }
 
-}  // namespace kmax::link::tagged_exchange_test
+}  // namespace kmax::device::tagged_exchange_test

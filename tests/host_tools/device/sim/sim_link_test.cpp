@@ -8,7 +8,7 @@
 #include "host_tools/device/parameter.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
-namespace kmax::link::sim_link_test {
+namespace kmax::device::sim_link_test {
 
 using device::Parameter;
 using host_tools_test::thrown_message;
@@ -151,4 +151,4 @@ RC_GTEST_PROP(SimLinkProperty, AnyReadIsAnsweredOrRefused, ()) {
   RC_ASSERT(first == ask());
 }
 
-}  // namespace kmax::link::sim_link_test
+}  // namespace kmax::device::sim_link_test

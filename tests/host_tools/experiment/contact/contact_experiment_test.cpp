@@ -104,21 +104,21 @@ TEST_F(Contact, AFaultJustBeforeTheEndIsReportedToo) {
     if (!text.ends_with("out of the wall") && ++calls == last)
       simulation().device().connect_encoder(0, false);
   };
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "lost its force");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run(0); }), "lost its force");
 }
 
 TEST_F(Contact, ATraceThatStopsEndsTheTrialDisarmed) {
   report = [&](const std::string&) { device.write(device::Parameter::of<"trace.interval">(), 0, true); };
-  EXPECT_CONTAINS(thrown_message<device::DeviceError>([&] { run(0); }), "trace has stopped");
+  EXPECT_CONTAINS(thrown_message<base::DeviceError>([&] { run(0); }), "trace has stopped");
   expect_disarmed();
 }
 
 TEST_F(Contact, ValuesThatAreNotAllowedAreRefusedBeforeArming) {
   settings.stiffness = -1;
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "wall.stiffness");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { run(0); }), "wall.stiffness");
   settings.stiffness = 5500;
   settings.haptic_rate = 333;
-  EXPECT_CONTAINS(thrown_message<device::ValueError>([&] { run(0); }), "haptic.rate");
+  EXPECT_CONTAINS(thrown_message<base::ValueError>([&] { run(0); }), "haptic.rate");
   EXPECT_TRUE(reported.empty());
   expect_disarmed();
 }

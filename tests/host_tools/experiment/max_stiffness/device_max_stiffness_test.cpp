@@ -159,7 +159,7 @@ TEST_F(DeviceStiffness, AFaultEndsTheRunWithItsWordsAndKeepsTheTouchesBefore) {
     if (text.find("3.5 N/mm, touch 1 of 1: holding") != std::string::npos)
       simulation().device().connect_encoder(0, false);
   };
-  const auto what = thrown_message<device::DeviceError>([&] { find(wall_with(2), nullptr, journal.get()); });
+  const auto what = thrown_message<base::DeviceError>([&] { find(wall_with(2), nullptr, journal.get()); });
   EXPECT_CONTAINS(what, "lost its force during the touch");
   EXPECT_CONTAINS(what, "encoder");
   EXPECT_EQ(journal->size(), 1u);

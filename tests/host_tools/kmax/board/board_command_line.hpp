@@ -36,8 +36,8 @@ class BoardCommandLine : public CommandLineFixture {
   }
   ~BoardCommandLine() override { unsetenv("XDG_CONFIG_HOME"); }
 
-  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
-    if (!device) throw link::LinkError("nobody answers");
+  std::unique_ptr<device::Link> open_device(const std::string&, const device::Notice&) override {
+    if (!device) throw device::LinkError("nobody answers");
     return std::make_unique<host_tools_test::FakeLink>(device);
   }
   void prepare(Context& context) override {

@@ -20,14 +20,15 @@ class DesignCommand : public SimulatedCommandLine {
     return kmax(all);
   }
   void expect_refused(const Arguments& arguments, const std::string& part) {
-    EXPECT_EQ(design(arguments), wrong_usage) << said;
+    EXPECT_EQ(design(arguments), base::wrong_usage) << said;
     EXPECT_CONTAINS(said, part);
     EXPECT_EQ(output, "");
   }
 };
 
 TEST_F(DesignCommand, SaysTheWallItsBoundItsPriceAndWhatWouldBuyMore) {
-  ASSERT_EQ(design({"--delay", "0.5ms", "--save", in("wall.toml"), "--out", in("pictures")}), done) << said;
+  ASSERT_EQ(design({"--delay", "0.5ms", "--save", in("wall.toml"), "--out", in("pictures")}), base::done)
+      << said;
   EXPECT_CONTAINS(output, "wall.stiffness = ");
   EXPECT_CONTAINS(words(), "Bound by Ann at ");
   EXPECT_CONTAINS(words(), "field at rest 0 N");
@@ -39,17 +40,17 @@ TEST_F(DesignCommand, SaysTheWallItsBoundItsPriceAndWhatWouldBuyMore) {
   // The file is one that 'kmax load' takes.
   const auto settings = device::read_parameter_file(in("wall.toml"));
   EXPECT_GE(settings.size(), 7U);
-  EXPECT_EQ(kmax({"load", in("wall.toml"), "--dry-run"}), done) << said;
+  EXPECT_EQ(kmax({"load", in("wall.toml"), "--dry-run"}), base::done) << said;
 }
 
 TEST_F(DesignCommand, FinishesFromSharesWithTheSameWall) {
-  ASSERT_EQ(design({"--json"}), done) << said;
+  ASSERT_EQ(design({"--json"}), base::done) << said;
   const Json whole = document();
   for (const char* share : {"1/2", "2/2"})
-    ASSERT_EQ(design({"--shard", share, "--out", in("shares")}), done) << said;
-  ASSERT_EQ(design({"--merge", in("shares"), "--json"}), done) << said;
+    ASSERT_EQ(design({"--shard", share, "--out", in("shares")}), base::done) << said;
+  ASSERT_EQ(design({"--merge", in("shares"), "--json"}), base::done) << said;
   EXPECT_EQ(document(), whole);
-  EXPECT_EQ(design({"--merge", in("shares"), "--margin", "10"}), failed) << "other settings";
+  EXPECT_EQ(design({"--merge", in("shares"), "--margin", "10"}), base::failed) << "other settings";
   EXPECT_CONTAINS(said, "design_wall_1_of_2.journal");
   std::filesystem::remove(in("shares/design_wall_2_of_2.journal"));
   expect_refused({"--merge", in("shares")}, "make it with --shard 2/2");
@@ -59,7 +60,7 @@ TEST_F(DesignCommand, TakesTheDeviceFromADump) {
   folder.write("handle.toml",
                "[device]\nmass = 0.06\n[guard]\nfriction = 0.2\n[haptic]\nrate = 250\n[force]\nlimit = 3\n"
                "[encoder]\ncounts_per_turn = 65536\n");
-  ASSERT_EQ(design({"--device", in("handle.toml"), "--save", in("wall.toml")}), done) << said;
+  ASSERT_EQ(design({"--device", in("handle.toml"), "--save", in("wall.toml")}), base::done) << said;
   const std::string text = folder.read("wall.toml");
   EXPECT_CONTAINS(text, "0.06 kg, friction 0.2 N");
   EXPECT_CONTAINS(text, "Loop of 250 Hz");
@@ -68,7 +69,7 @@ TEST_F(DesignCommand, TakesTheDeviceFromADump) {
 }
 
 TEST_F(DesignCommand, ThatNoWallHoldsIsAVerdict) {
-  EXPECT_EQ(design({"--rate", "250Hz", "--depth", "0.001mm"}), verdict_is_no);
+  EXPECT_EQ(design({"--rate", "250Hz", "--depth", "0.001mm"}), base::verdict_is_no);
   EXPECT_CONTAINS(words(), "Allow more with --depth");
 }
 
@@ -85,7 +86,7 @@ TEST_F(DesignCommand, RefusesWhatIsNotAllowedAndSaysWhatIs) {
   expect_refused({"--shard", "1/2", "--merge", in("x")}, "leave one of them out");
   expect_refused({"--shard", "1/2", "--out", in("x"), "--save", in("w.toml")}, "give it with --merge");
   expect_refused({"--merge", in("nothing")}, "no share is in there");
-  EXPECT_EQ(kmax({"design", "wall", "--subjects", in("nobody.toml")}), wrong_usage);
+  EXPECT_EQ(kmax({"design", "wall", "--subjects", in("nobody.toml")}), base::wrong_usage);
   EXPECT_CONTAINS(said, "there is no such file");
 }
 

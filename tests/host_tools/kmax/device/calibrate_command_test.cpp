@@ -13,8 +13,8 @@ class Calibrate : public SimulatedCommandLine {
   int on_scene(const std::string& scene, std::vector<std::string> arguments,
                std::optional<simulation::Defect> defect = {}) {
     std::ostringstream out, messages;
-    Context context(out, messages, [&](const std::string&, const link::Notice&) {
-      auto link = std::make_unique<link::SimLink>(simulated_board::open_scene(scene));
+    Context context(out, messages, [&](const std::string&, const device::Notice&) {
+      auto link = std::make_unique<device::SimLink>(simulated_board::open_scene(scene));
       link->wait(std::chrono::milliseconds(300));
       if (defect) link->simulation().device().power().drives().plant(0, *defect);
       return link;
@@ -27,7 +27,7 @@ class Calibrate : public SimulatedCommandLine {
 };
 
 TEST_F(Calibrate, ADocumentHasEveryStepWithItsValues) {
-  ASSERT_EQ(on_scene("dc_coreless_a", {"calibrate", "--steps", "electrical", "--json"}), done) << said;
+  ASSERT_EQ(on_scene("dc_coreless_a", {"calibrate", "--steps", "electrical", "--json"}), base::done) << said;
   EXPECT_EQ(keys(), (std::vector<std::string>{"steps", "pass", "dry_run", "kept", "stored"}));
   const Json all = document();
   EXPECT_EQ(all["stored"], true);
@@ -53,33 +53,36 @@ TEST_F(Calibrate, ADocumentHasEveryStepWithItsValues) {
 }
 
 TEST_F(Calibrate, ADefectIsAVerdictWithItsName) {
-  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--json"}, simulation::Defect::phase_b_open), verdict_is_no)
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--json"}, simulation::Defect::phase_b_open),
+            base::verdict_is_no)
       << said;
   const Json all = document();
   EXPECT_EQ(all["stored"], false);
   EXPECT_EQ(all["pass"], false);
   EXPECT_EQ(all["kept"], false);
   EXPECT_EQ(all["steps"][1]["failure"]["cause"], "phase_b_open");
-  EXPECT_EQ(on_scene("gimbal_a", {"calibrate"}, simulation::Defect::phase_b_open), verdict_is_no);
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate"}, simulation::Defect::phase_b_open), base::verdict_is_no);
   EXPECT_CONTAINS(said, "this takes about 3 minutes over a serial line of 115200 baud, less over CAN");
   EXPECT_CONTAINS(output, "phase_b_open");
   EXPECT_CONTAINS(output, "nothing was kept");
 }
 
 TEST_F(Calibrate, TheTableSaysWhatWasBefore) {
-  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--dry-run"}), done) << said;
+  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--dry-run"}), base::done)
+      << said;
   EXPECT_CONTAINS(output, "motor.resistance");
   EXPECT_CONTAINS(output, "was 1");
   EXPECT_CONTAINS(said, "this takes about 20 s over a serial line");
   EXPECT_CONTAINS(output, "dry run");
-  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--no-save"}), done) << said;
+  ASSERT_EQ(on_scene("dc_coreless_b", {"calibrate", "--steps", "electrical", "--no-save"}), base::done)
+      << said;
   EXPECT_CONTAINS(output, "kmax save");
 }
 
 TEST_F(Calibrate, AHandThatNobodyLendsEndsItWithEverythingAsBefore) {
   const int before = dup(STDIN_FILENO), nobody = open("/dev/null", O_RDONLY);
   ASSERT_EQ(dup2(nobody, STDIN_FILENO), STDIN_FILENO);
-  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--hand"}), failed) << output;
+  EXPECT_EQ(on_scene("gimbal_a", {"calibrate", "--hand"}), base::failed) << output;
   dup2(before, STDIN_FILENO);
   close(before);
   close(nobody);
@@ -89,8 +92,8 @@ TEST_F(Calibrate, AHandThatNobodyLendsEndsItWithEverythingAsBefore) {
 }
 
 TEST_F(Calibrate, WithoutAMotorThereIsNothingToDo) {
-  expect_error({"calibrate"}, failed, "nothing to calibrate");
-  expect_error({"calibrate"}, failed, "kmax serve --scene gimbal_a");
+  expect_error({"calibrate"}, base::failed, "nothing to calibrate");
+  expect_error({"calibrate"}, base::failed, "kmax serve --scene gimbal_a");
 }
 
 TEST_F(Calibrate, BadOptionsAreWrongUsage) {
@@ -102,7 +105,7 @@ TEST_F(Calibrate, BadOptionsAreWrongUsage) {
                                                                                    {"extra"}}) {
     std::vector<std::string> arguments = {"calibrate"};
     arguments.insert(arguments.end(), bad.begin(), bad.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << ": " << said;
+    EXPECT_EQ(kmax(arguments), base::wrong_usage) << bad[0] << ": " << said;
   }
 }
 

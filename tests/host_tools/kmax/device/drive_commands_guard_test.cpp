@@ -9,7 +9,7 @@ namespace kmax::cli::drive_commands_guard_test {
 
 /// A link to the whole firmware on a bench with a scripted device, which outlives it: what a host asks goes
 /// through the firmware's own Modbus line, in the bench's time.
-class BenchLink final : public link::RegisterLink {
+class BenchLink final : public device::RegisterLink {
  public:
   explicit BenchLink(std::shared_ptr<board::Bench> bench) : bench_(std::move(bench)) {}
 
@@ -42,8 +42,8 @@ class BenchLink final : public link::RegisterLink {
     return words;
   }
   static void check(int exception, std::uint8_t function, std::uint16_t address) {
-    if (exception < 0) throw link::LinkError("nobody answers");
-    if (exception > 0) throw link::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
+    if (exception < 0) throw device::LinkError("nobody answers");
+    if (exception > 0) throw device::RegisterRefused(static_cast<std::uint8_t>(exception), function, address);
   }
 
   std::shared_ptr<board::Bench> bench_;
@@ -62,7 +62,7 @@ class GuardOnCommandLine : public CommandLineFixture {
     bench->run_ms(5);
   }
 
-  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+  std::unique_ptr<device::Link> open_device(const std::string&, const device::Notice&) override {
     return std::make_unique<BenchLink>(bench);
   }
   Json axis_0() { return document()["axes"][0]; }
@@ -72,20 +72,20 @@ class GuardOnCommandLine : public CommandLineFixture {
 };
 
 TEST_F(GuardOnCommandLine, ARefusalToArmTellsTheNumbersAndWhatToDo) {
-  ASSERT_EQ(kmax({"set", "guard.mode=refuse", "wall.stiffness=5500"}), done) << said;
-  EXPECT_EQ(kmax({"arm"}), failed);
+  ASSERT_EQ(kmax({"set", "guard.mode=refuse", "wall.stiffness=5500"}), base::done) << said;
+  EXPECT_EQ(kmax({"arm"}), base::failed);
   EXPECT_FALSE(armed());
   EXPECT_CONTAINS(said, "axis 0 was not armed: refused: stability check: wall.stiffness 5500 N/m exceeds ");
   EXPECT_CONTAINS(said, "(Colgate");
   EXPECT_CONTAINS(said, "lower wall.stiffness");
   EXPECT_CONTAINS(said, "guard.damping if the device has more");
   EXPECT_CONTAINS(said, "'kmax check' explains");
-  EXPECT_EQ(kmax({"arm", "--json"}), failed);
+  EXPECT_EQ(kmax({"arm", "--json"}), base::failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "wall.stiffness 5500 N/m exceeds ");
 
-  EXPECT_EQ(kmax({"state"}), done);
+  EXPECT_EQ(kmax({"state"}), base::done);
   EXPECT_CONTAINS(output, "the last attempt to arm was refused: stability check: wall.stiffness 5500 N/m");
-  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(kmax({"state", "--json"}), base::done);
   EXPECT_EQ(axis_0()["warning"], false);
   const Json check = axis_0()["stability_check"];
   EXPECT_EQ(check["pass"], false);
@@ -96,40 +96,41 @@ TEST_F(GuardOnCommandLine, ARefusalToArmTellsTheNumbersAndWhatToDo) {
   EXPECT_EQ(check["unit"], "N/m");
   EXPECT_EQ(document()["axes"][1]["stability_check"], nullptr) << "not judged";
 
-  ASSERT_EQ(kmax({"set", "wall.stiffness=3000"}), done);
-  EXPECT_EQ(kmax({"state"}), done);
+  ASSERT_EQ(kmax({"set", "wall.stiffness=3000"}), base::done);
+  EXPECT_EQ(kmax({"state"}), base::done);
   EXPECT_CONTAINS(output, "the last attempt to arm was refused: the stability check fails");
-  EXPECT_EQ(kmax({"arm"}), done) << said;
+  EXPECT_EQ(kmax({"arm"}), base::done) << said;
   EXPECT_TRUE(armed());
   EXPECT_EQ(said.find("stability"), std::string::npos) << said;
-  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(kmax({"state", "--json"}), base::done);
   EXPECT_EQ(axis_0()["stability_check"]["pass"], true);
   EXPECT_EQ(axis_0()["stability_check"]["message"], "");
 }
 
 TEST_F(GuardOnCommandLine, AWarningArmsAndIsSaidOnceBesideTheResult) {
-  ASSERT_EQ(kmax({"set", "guard.mode=warn", "wall.stiffness=5500"}), done) << said;
-  EXPECT_EQ(kmax({"arm", "--json"}), done);
+  ASSERT_EQ(kmax({"set", "guard.mode=warn", "wall.stiffness=5500"}), base::done) << said;
+  EXPECT_EQ(kmax({"arm", "--json"}), base::done);
   EXPECT_TRUE(armed());
   EXPECT_CONTAINS(said, "armed with a warning: stability check: wall.stiffness 5500 N/m exceeds ");
   EXPECT_EQ(axis_0()["warning"], true);
   EXPECT_EQ(axis_0()["stability_check"]["pass"], false);
-  EXPECT_EQ(kmax({"state"}), done);
-  EXPECT_CONTAINS(output, "armed, force is on (Operation enabled); stability check: wall.stiffness 5500 N/m exceeds ");
+  EXPECT_EQ(kmax({"state"}), base::done);
+  EXPECT_CONTAINS(
+      output, "armed, force is on (Operation enabled); stability check: wall.stiffness 5500 N/m exceeds ");
 }
 
 TEST_F(GuardOnCommandLine, OffSaysNothing) {
-  ASSERT_EQ(kmax({"set", "wall.stiffness=1e6"}), done) << said;
-  EXPECT_EQ(kmax({"arm"}), done);
+  ASSERT_EQ(kmax({"set", "wall.stiffness=1e6"}), base::done) << said;
+  EXPECT_EQ(kmax({"arm"}), base::done);
   EXPECT_EQ((said + output).find("stability"), std::string::npos) << said << output;
-  EXPECT_EQ(kmax({"state", "--json"}), done);
+  EXPECT_EQ(kmax({"state", "--json"}), base::done);
   EXPECT_EQ(axis_0()["stability_check"], nullptr);
 }
 
 TEST_F(GuardOnCommandLine, ASetThatIsRefusedWhileArmedNamesTheParameterAndChangesNothing) {
-  ASSERT_EQ(kmax({"set", "guard.mode=refuse", "wall.stiffness_ceiling=6000"}), done) << said;
-  ASSERT_EQ(kmax({"arm"}), done) << said;
-  EXPECT_EQ(kmax({"set", "force.limit=2", "wall.stiffness=5500"}), failed);
+  ASSERT_EQ(kmax({"set", "guard.mode=refuse", "wall.stiffness_ceiling=6000"}), base::done) << said;
+  ASSERT_EQ(kmax({"arm"}), base::done) << said;
+  EXPECT_EQ(kmax({"set", "force.limit=2", "wall.stiffness=5500"}), base::failed);
   EXPECT_CONTAINS(said, "wall.stiffness = 5500 N/m: the device refused: the stability check fails");
   EXPECT_CONTAINS(said, "; wall.stiffness 5500 N/m exceeds 4000");
   EXPECT_CONTAINS(said, "(Colgate");

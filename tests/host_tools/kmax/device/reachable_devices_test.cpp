@@ -100,12 +100,12 @@ TEST(ReachableDevices, OnUsbWithWhatIsMissingAndHowToGetIt) {
 }
 
 TEST(ReachableDevices, NodesThatAreKmaxDevicesHaveAnAddress) {
-  link::FoundNode kmax{.node = 5, .state = 127, .device_type = firmware::device_type_of_several_axes};
+  device::FoundNode kmax{.node = 5, .state = 127, .device_type = firmware::device_type_of_several_axes};
   kmax.identity = {0, firmware::product_code, 0x100, 0x1234};
   kmax.name = "Kmax";
-  link::FoundNode other{.node = 7, .device_type = 0x20192};
-  link::FoundNode silent{.node = 9, .state = 4};
-  link::FoundNode busy{.node = 11};
+  device::FoundNode other{.node = 7, .device_type = 0x20192};
+  device::FoundNode silent{.node = 9, .state = 4};
+  device::FoundNode busy{.node = 11};
   busy.in_use = true;
   const auto devices = nodes_on("can0", {kmax, other, silent, busy});
   ASSERT_EQ(devices.size(), 4u);

@@ -9,7 +9,7 @@ namespace kmax::cli::selftest_command_test {
 class SelfTestCommand : public SimulatedCommandLine {
  protected:
   /// Arms and presses the emergency stop for a moment.
-  static void leave_fault(link::SimLink& sim) {
+  static void leave_fault(device::SimLink& sim) {
     for (const std::uint16_t word : std::initializer_list<std::uint16_t>{0x00, 0x06, 0x07, 0x0F}) {
       sim.write_holding(device::Parameter::of<"drive.controlword">(0).address(), {&word, 1});
       sim.wait(std::chrono::milliseconds(50));
@@ -29,8 +29,8 @@ class SelfTestCommand : public SimulatedCommandLine {
       axis.person.reset();
     }
     std::ostringstream out, messages;
-    Context context(out, messages, [&](const std::string&, const link::Notice&) {
-      auto sim = std::make_unique<link::SimLink>(scene);
+    Context context(out, messages, [&](const std::string&, const device::Notice&) {
+      auto sim = std::make_unique<device::SimLink>(scene);
       // A scene without a motor has no power stage.
       const auto power = [&]() -> auto& {
         return sim->simulation().device().power();
@@ -54,7 +54,7 @@ class SelfTestCommand : public SimulatedCommandLine {
 };
 
 TEST_F(SelfTestCommand, ShowsATableAndOneSentence) {
-  EXPECT_EQ(selftest(""), done) << said;
+  EXPECT_EQ(selftest(""), base::done) << said;
   for (const char* name : {"link", "supply", "emergency stop", "gate driver", "temperature", "current sense",
                            "phases", "encoder"})
     EXPECT_CONTAINS("\n" + output, std::string("\n") + name);
@@ -64,7 +64,7 @@ TEST_F(SelfTestCommand, ShowsATableAndOneSentence) {
 }
 
 TEST_F(SelfTestCommand, SaysItAsOneDocument) {
-  EXPECT_EQ(selftest("", {"--json"}), done) << said;
+  EXPECT_EQ(selftest("", {"--json"}), base::done) << said;
   const Json report = document();
   EXPECT_EQ(report["pass"], true);
   EXPECT_TRUE(report["faulty_part"].is_null());
@@ -81,22 +81,22 @@ TEST_F(SelfTestCommand, SaysItAsOneDocument) {
 }
 
 TEST_F(SelfTestCommand, AFaultEndsWithCodeThreeAndNamesThePart) {
-  EXPECT_EQ(selftest("encoder_stuck", {"--json"}), verdict_is_no) << said;
+  EXPECT_EQ(selftest("encoder_stuck", {"--json"}), base::verdict_is_no) << said;
   EXPECT_EQ(document()["pass"], false);
   EXPECT_EQ(document()["faulty_part"], "encoder");
-  EXPECT_EQ(selftest("phase_b_open"), verdict_is_no);
+  EXPECT_EQ(selftest("phase_b_open"), base::verdict_is_no);
   EXPECT_CONTAINS(output, "The faulty part is: motor winding or cable (B to C open)");
-  EXPECT_EQ(selftest("emergency_stop"), verdict_is_no);
+  EXPECT_EQ(selftest("emergency_stop"), base::verdict_is_no);
   EXPECT_CONTAINS(output, "The faulty part is: emergency stop");
   EXPECT_CONTAINS(output, "not judged");
 }
 
 TEST_F(SelfTestCommand, ThePersonOfTheDefaultSceneIsAskedToLetGo) {
   // It begins to move when the axis is armed, by some millimetres.
-  EXPECT_EQ(kmax({"selftest"}), verdict_is_no) << said;
+  EXPECT_EQ(kmax({"selftest"}), base::verdict_is_no) << said;
   EXPECT_CONTAINS(output, "The faulty part is: handle");
   EXPECT_CONTAINS(output, "no power stage");
-  EXPECT_EQ(kmax({"selftest", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(kmax({"selftest", "--json"}), base::verdict_is_no) << said;
   EXPECT_EQ(document()["faulty_part"], "handle");
   EXPECT_CONTAINS(document()["checks"][5]["message"].get<std::string>(),
                   "something else moved the handle; let go of it");
@@ -104,41 +104,41 @@ TEST_F(SelfTestCommand, ThePersonOfTheDefaultSceneIsAskedToLetGo) {
 
 TEST_F(SelfTestCommand, ABoardWithoutPowerStageSaysWhatItCannotJudge) {
   scene_name = "touch";
-  EXPECT_EQ(selftest(""), done) << said;
+  EXPECT_EQ(selftest(""), base::done) << said;
   EXPECT_CONTAINS(output, "No fault was found; not judged: supply");
   EXPECT_CONTAINS(output, "no power stage");
 }
 
 TEST_F(SelfTestCommand, AFaultThatWasThereBeforeIsShown) {
-  EXPECT_EQ(selftest("fault before"), done) << said;
+  EXPECT_EQ(selftest("fault before"), base::done) << said;
   EXPECT_CONTAINS("\n" + output, "\nfault before the test ");
   EXPECT_CONTAINS(output, "(cleared)");
-  EXPECT_EQ(selftest("fault before", {"--json"}), done) << said;
+  EXPECT_EQ(selftest("fault before", {"--json"}), base::done) << said;
   const Json before = document()["fault_at_start"];
   EXPECT_EQ(before["name"], "emergency_stop");
   EXPECT_EQ(before["cleared"], true);
   EXPECT_TRUE(before["message"].is_string());
-  EXPECT_EQ(selftest(""), done);
+  EXPECT_EQ(selftest(""), base::done);
   EXPECT_EQ(output.find("fault before"), std::string::npos);
 }
 
 TEST_F(SelfTestCommand, AnInterruptionSaysWhatHasBecomeOfTheDevice) {
-  EXPECT_EQ(selftest("interrupted"), failed);
+  EXPECT_EQ(selftest("interrupted"), base::failed);
   EXPECT_CONTAINS(said, "interrupted; nothing was changed in the device");
 }
 
 TEST_F(SelfTestCommand, NobodyMovesTheHandleOrPressesTheStop) {
-  EXPECT_EQ(selftest("", {"--hand", "--patience", "1", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(selftest("", {"--hand", "--patience", "1", "--json"}), base::verdict_is_no) << said;
   EXPECT_EQ(document()["checks"].size(), 11U);
   EXPECT_CONTAINS(said, "move the handle by hand");
   EXPECT_CONTAINS(said, "press the emergency stop");
 }
 
 TEST_F(SelfTestCommand, WrongOptionsAreUsageErrors) {
-  expect_error({"selftest", "--exchanges", "0"}, wrong_usage, "exchanges");
-  expect_error({"selftest", "--hand", "--patience", "-1"}, wrong_usage, "patience");
+  expect_error({"selftest", "--exchanges", "0"}, base::wrong_usage, "exchanges");
+  expect_error({"selftest", "--hand", "--patience", "-1"}, base::wrong_usage, "patience");
   for (const char* number : {"nan", "-nan", "inf", "NaN"})
-    expect_error({"selftest", "--patience", number}, wrong_usage, "patience");
+    expect_error({"selftest", "--patience", number}, base::wrong_usage, "patience");
 }
 
 }  // namespace kmax::cli::selftest_command_test

@@ -12,7 +12,7 @@ TEST_F(ContactCommand, ContactIsADocumentWithAConditionForEachWall) {
   // Which of the two is a matter of the sampling instants of single touches.
   const int code = kmax({"experiment", "contact", "--trials", "1", "--hold", "1s", "--rate", "0.5kHz",
                          "--expect-paper", "--out", in("results"), "--json"});
-  ASSERT_TRUE(code == done || code == verdict_is_no) << said;
+  ASSERT_TRUE(code == base::done || code == base::verdict_is_no) << said;
   EXPECT_EQ(keys(),
             (std::vector<std::string>{"stiffness_n_per_m", "haptic_rate_hz", "hold_time_s", "threshold_m",
                                       "changed", "velocity_estimator", "conditions", "files"}));
@@ -26,7 +26,7 @@ TEST_F(ContactCommand, ContactIsADocumentWithAConditionForEachWall) {
   }
   const bool all_agree = std::all_of(conditions.begin(), conditions.end(),
                                      [](const Json& c) { return c["agrees"].get<bool>(); });
-  EXPECT_EQ(code, all_agree ? done : verdict_is_no);
+  EXPECT_EQ(code, all_agree ? base::done : base::verdict_is_no);
   ASSERT_EQ(document()["files"].size(), 14u);
   const Json files = document()["files"];
   for (const Json& file : files) EXPECT_TRUE(std::filesystem::exists(file.get<std::string>()));
@@ -56,7 +56,7 @@ TEST_F(ContactCommand, BadOptionsAreWrongUsage) {
                                                                                    {"--device", "tcp:x"}}) {
     std::vector<std::string> arguments = {"experiment", "contact"};
     arguments.insert(arguments.end(), bad.begin(), bad.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
+    EXPECT_EQ(kmax(arguments), base::wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
   }
 }
 
@@ -64,7 +64,7 @@ TEST_F(ContactCommand, ADifferenceToThePaperIsAResultLikeAnyOther) {
   // By a threshold that no touch keeps to, the paper's stable conditions come out unstable.
   const std::vector<std::string> arguments{"experiment", "contact", "--trials",    "1",
                                            "--hold",     "1",       "--threshold", "1e-9"};
-  EXPECT_EQ(kmax(arguments), done) << said;
+  EXPECT_EQ(kmax(arguments), base::done) << said;
   EXPECT_CONTAINS(output, "agrees");
   EXPECT_CONTAINS(output, " no\n");
   EXPECT_EQ(output.find("trials counts"), std::string::npos) << "one touch has no worst";
@@ -73,7 +73,7 @@ TEST_F(ContactCommand, ADifferenceToThePaperIsAResultLikeAnyOther) {
 TEST_F(ContactCommand, AnotherWallThanThePapersIsNotJudgedAgainstItsVerdicts) {
   const std::vector<std::string> arguments{"experiment", "contact", "--trials", "1",           "--hold",
                                            "1",          "--rate",  "800",      "--stiffness", "4700"};
-  EXPECT_EQ(kmax(arguments), done) << said;
+  EXPECT_EQ(kmax(arguments), base::done) << said;
   EXPECT_CONTAINS(output, "verdicts are of a wall of 5.5 N/mm at 500 Hz");
   EXPECT_CONTAINS(output, "not compared\n");
   auto with = [&](const char* more) {
@@ -81,9 +81,9 @@ TEST_F(ContactCommand, AnotherWallThanThePapersIsNotJudgedAgainstItsVerdicts) {
     all.emplace_back(more);
     return all;
   };
-  EXPECT_EQ(kmax(with("--json")), done) << said;
+  EXPECT_EQ(kmax(with("--json")), base::done) << said;
   for (const Json& condition : document()["conditions"]) EXPECT_TRUE(condition["agrees"].is_null());
-  EXPECT_EQ(kmax(with("--expect-paper")), wrong_usage);
+  EXPECT_EQ(kmax(with("--expect-paper")), base::wrong_usage);
   EXPECT_CONTAINS(said, "leave --stiffness, --rate and");
 }
 
@@ -91,7 +91,7 @@ TEST_F(ContactCommand, EveryTouchIsAsItIsSetToBe) {
   const auto plain_with = [&](std::vector<std::string> more) {
     std::vector<std::string> arguments = {"experiment", "contact", "--trials", "1", "--hold", "1", "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    EXPECT_EQ(kmax(arguments), done) << said;
+    EXPECT_EQ(kmax(arguments), base::done) << said;
     return document();
   };
   const Json usual = plain_with({});
@@ -106,14 +106,14 @@ TEST_F(ContactCommand, EveryTouchIsAsItIsSetToBe) {
   EXPECT_EQ(changed["conditions"][0]["verdict"], "stable");
   EXPECT_NEAR(usual["conditions"][0]["contact_speed_m_per_s"].get<double>(), 0.2, 0.06);
   EXPECT_NEAR(changed["conditions"][0]["contact_speed_m_per_s"].get<double>(), 0.05, 0.02);
-  EXPECT_EQ(kmax({"experiment", "contact", "--set", "wall.stiffness=3"}), wrong_usage);
+  EXPECT_EQ(kmax({"experiment", "contact", "--set", "wall.stiffness=3"}), base::wrong_usage);
   EXPECT_CONTAINS(said, "--stiffness");
 }
 
 TEST_F(ContactCommand, AFolderThatCannotBeMadeIsAFailure) {
   folder.write("file", "");
   EXPECT_EQ(kmax({"experiment", "contact", "--trials", "1", "--hold", "1", "--out", in("file/x"), "--json"}),
-            failed);
+            base::failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "file/x");
 }
 
@@ -134,7 +134,7 @@ class ContactOnADevice : public ContactCommand {
                                           "--trials",   "1",       "--hold",   "1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return kmax(std::move(arguments),
-                [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
+                [](const std::string&, const device::Notice&) { return device::make_sim_link(); });
   }
 
  private:
@@ -142,20 +142,21 @@ class ContactOnADevice : public ContactCommand {
 };
 
 TEST_F(ContactOnADevice, SomebodyIsAskedBeforeThereIsForce) {
-  EXPECT_EQ(on_device({}), failed);
+  EXPECT_EQ(on_device({}), base::failed);
   EXPECT_CONTAINS(said, "F_MC = 0 N: take the handle out of the wall");
   EXPECT_CONTAINS(said, "--no-prompt");
   EXPECT_EQ(said.find("holding"), std::string::npos);
 }
 
 TEST_F(ContactOnADevice, WithoutAPromptNobodyIsAsked) {
-  EXPECT_EQ(on_device({"--no-prompt", "--json"}), done) << said;
+  EXPECT_EQ(on_device({"--no-prompt", "--json"}), base::done) << said;
   EXPECT_EQ(said.find("take the handle out of the wall and be ready"), std::string::npos) << said;
   EXPECT_EQ(document()["conditions"].size(), 6u);
 }
 
 TEST_F(ContactCommand, TheSecondAxisOfASimulatedDeviceHasNobodyToTouchIt) {
-  EXPECT_EQ(kmax({"experiment", "contact", "--axis", "1", "--trials", "1", "--json"}), failed) << output;
+  EXPECT_EQ(kmax({"experiment", "contact", "--axis", "1", "--trials", "1", "--json"}), base::failed)
+      << output;
 }
 
 }  // namespace kmax::cli::contact_command_test

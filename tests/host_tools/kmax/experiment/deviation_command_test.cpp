@@ -8,7 +8,8 @@ class DeviationCommand : public ExperimentCommandLine {
 };
 
 TEST_F(DeviationCommand, TheDocumentHasEveryPairAndTheVerdict) {
-  ASSERT_EQ(simulated({"--pulses", "1", "--rest", "0.2", "--out", in("results"), "--json"}), done) << said;
+  ASSERT_EQ(simulated({"--pulses", "1", "--rest", "0.2", "--out", in("results"), "--json"}), base::done)
+      << said;
   EXPECT_EQ(keys(), (std::vector<std::string>{"origin", "circumstances", "pairs", "verdict",
                                               "without_stiffening", "paper_table_fits", "files"}));
   const Json all = document();
@@ -32,7 +33,7 @@ TEST_F(DeviationCommand, TheDocumentHasEveryPairAndTheVerdict) {
 TEST_F(DeviationCommand, AHandThatCannotStiffenIsAnswerNo) {
   EXPECT_EQ(
       simulated({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--activation-gain", "0", "--json"}),
-      verdict_is_no)
+      base::verdict_is_no)
       << said;
   const Json trends = document()["verdict"]["trends"];
   ASSERT_EQ(trends.size(), 3u);
@@ -45,7 +46,8 @@ TEST_F(DeviationCommand, AHandThatCannotStiffenIsAnswerNo) {
 }
 
 TEST_F(DeviationCommand, PicturesHaveTheKindAskedFor) {
-  EXPECT_EQ(simulated({"--pulses", "1", "--rest", "0.2", "--out", in("results"), "--format", "png"}), done)
+  EXPECT_EQ(simulated({"--pulses", "1", "--rest", "0.2", "--out", in("results"), "--format", "png"}),
+            base::done)
       << said;
   EXPECT_EQ(folder.read("results/deviation_trends.png").substr(1, 3), "PNG");
   EXPECT_CONTAINS(output, in("results/deviation.csv"));
@@ -53,7 +55,8 @@ TEST_F(DeviationCommand, PicturesHaveTheKindAskedFor) {
 
 TEST_F(DeviationCommand, ADeviceIsMeasured) {
   // Nothing hangs on this board's second axis, so that nothing gives way along the surface.
-  EXPECT_EQ(on_device({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(on_device({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--json"}), base::verdict_is_no)
+      << said;
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["pairs"].size(), 16u);
@@ -75,14 +78,14 @@ TEST_F(DeviationCommand, ADeviceIsMeasured) {
 // At 20 N/mm no hand holds the plain wall still.
 TEST_F(DeviationCommand, ATouchThatWasEndedIsExplained) {
   EXPECT_EQ(on_device({"--expect-paper", "--pulses", "1", "--rest", "0.2", "--stiffness", "20000"}),
-            verdict_is_no)
+            base::verdict_is_no)
       << said;
   EXPECT_CONTAINS(said, "F_B = 0 N, F_I = 1 N: not counted, the handle swung too far");
   EXPECT_CONTAINS(said, "left the wall before the 2.4 s of the touch were over");
 }
 
 TEST_F(DeviationCommand, APushThatLosesTheWallIsRefused) {
-  expect_error({"experiment", "deviation", "--push", "0.5"}, wrong_usage, "push harder than every F_B");
+  expect_error({"experiment", "deviation", "--push", "0.5"}, base::wrong_usage, "push harder than every F_B");
 }
 
 TEST_F(DeviationCommand, BadValuesAreRefusedWithTheirOption) {

@@ -18,14 +18,15 @@ class ExperimentCommandLine : public SimulatedCommandLine {
   int simulated(const Arguments& more) { return kmax(all_of({"experiment", experiment_}, more)); }
 
   int on_device(const Arguments& more) {
-    return kmax(
-        all_of({"experiment", experiment_, "--device", "serial:/dev/none", "--no-prompt"}, more),
-        [this](const std::string&, const link::Notice&) { return std::make_unique<link::SimLink>(board); });
+    return kmax(all_of({"experiment", experiment_, "--device", "serial:/dev/none", "--no-prompt"}, more),
+                [this](const std::string&, const device::Notice&) {
+                  return std::make_unique<device::SimLink>(board);
+                });
   }
 
   /// The message must name the option and tell what is wrong with its value.
   void expect_refused(const std::string& option, const std::string& value, const std::string& why) {
-    EXPECT_EQ(simulated({option, value}), wrong_usage) << option << " " << value;
+    EXPECT_EQ(simulated({option, value}), base::wrong_usage) << option << " " << value;
     EXPECT_CONTAINS(said, option);
     EXPECT_CONTAINS(said, why);
     EXPECT_EQ(output, "");
@@ -43,13 +44,13 @@ class ExperimentCommandLine : public SimulatedCommandLine {
     for (const char* option : {"--stiffness", "--rate", "--force-limit", "--abort-amplitude", "--patience"})
       expect_refused(option, "0", "not in range");
     expect_refused("--format", "gif", "gif");
-    EXPECT_EQ(simulated({"--axis", "2"}), wrong_usage);
-    EXPECT_EQ(simulated({"--device", "tcp:x"}), wrong_usage);
-    EXPECT_EQ(simulated({"extra"}), wrong_usage);
-    EXPECT_EQ(simulated({"--subjects", in("missing.toml"), "--json"}), wrong_usage) << said;
+    EXPECT_EQ(simulated({"--axis", "2"}), base::wrong_usage);
+    EXPECT_EQ(simulated({"--device", "tcp:x"}), base::wrong_usage);
+    EXPECT_EQ(simulated({"extra"}), base::wrong_usage);
+    EXPECT_EQ(simulated({"--subjects", in("missing.toml"), "--json"}), base::wrong_usage) << said;
     EXPECT_CONTAINS(document()["error"].get<std::string>(), "missing.toml");
     folder.write("file", "");
-    EXPECT_EQ(simulated({"--out", in("file/x"), "--json"}), failed);
+    EXPECT_EQ(simulated({"--out", in("file/x"), "--json"}), base::failed);
     EXPECT_CONTAINS(document()["error"].get<std::string>(), "file/x");
   }
 

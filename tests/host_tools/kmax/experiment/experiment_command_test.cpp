@@ -9,7 +9,7 @@ namespace kmax::cli::experiment_command_test {
 struct Experiment : SimulatedCommandLine {
   /// Of all experiments, as the help lists them: two spaces, the name, what it does.
   std::vector<std::string> names() {
-    EXPECT_EQ(kmax({"experiment", "--help"}), done);
+    EXPECT_EQ(kmax({"experiment", "--help"}), base::done);
     std::istringstream help(output.substr(output.find("Commands:")));
     std::vector<std::string> all;
     for (std::string line; std::getline(help, line);)
@@ -20,27 +20,27 @@ struct Experiment : SimulatedCommandLine {
 };
 
 TEST_F(Experiment, WithoutANameOrWithAnUnknownOneIsWrongUsage) {
-  EXPECT_EQ(kmax({"experiment"}), wrong_usage);
-  EXPECT_EQ(kmax({"experiment", "nothing"}), wrong_usage);
+  EXPECT_EQ(kmax({"experiment"}), base::wrong_usage);
+  EXPECT_EQ(kmax({"experiment", "nothing"}), base::wrong_usage);
 }
 
 // The help that a message points to is the one that has the option.
 TEST_F(Experiment, AWrongValuePointsToTheHelpOfTheExperimentThatItWasGivenTo) {
-  expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
+  expect_error({"experiment", "jitter", "--stiffness", "0"}, base::wrong_usage,
                "experiment jitter: --stiffness: 0 N/m not in range 1 .. 1e6 N/m");
-  expect_error({"experiment", "jitter", "--stiffness", "0"}, wrong_usage,
+  expect_error({"experiment", "jitter", "--stiffness", "0"}, base::wrong_usage,
                "'kmax experiment jitter --help' explains it");
-  expect_error({"--device", "sim", "experiment", "resolution", "--nothing"}, wrong_usage,
+  expect_error({"--device", "sim", "experiment", "resolution", "--nothing"}, base::wrong_usage,
                "'kmax experiment resolution --help' explains it");
-  expect_error({"experiment", "--nothing", "jitter"}, wrong_usage, "'kmax experiment");
-  expect_error({"experiment"}, wrong_usage, "'kmax experiment --help' explains it");
-  expect_error({"wall", "--position", "here"}, wrong_usage, "'kmax wall --help' explains it");
+  expect_error({"experiment", "--nothing", "jitter"}, base::wrong_usage, "'kmax experiment");
+  expect_error({"experiment"}, base::wrong_usage, "'kmax experiment --help' explains it");
+  expect_error({"wall", "--position", "here"}, base::wrong_usage, "'kmax wall --help' explains it");
 }
 
 TEST_F(Experiment, HelpNamesEveryExperimentOfThePapers) {
   EXPECT_GE(names().size(), 5u);
   for (const std::string& name : names()) {
-    EXPECT_EQ(kmax({"experiment", name, "--help"}), done) << name;
+    EXPECT_EQ(kmax({"experiment", name, "--help"}), base::done) << name;
     EXPECT_CONTAINS(output, "kmax experiment " + name + " ");
     EXPECT_CONTAINS(output, "--out");
   }
@@ -49,7 +49,7 @@ TEST_F(Experiment, HelpNamesEveryExperimentOfThePapers) {
 // An option of the other kind of device would be believed to be at work.
 TEST_F(Experiment, OptionsOfTheOtherKindOfDeviceAreRefused) {
   for (const std::string& name : names()) {
-    EXPECT_EQ(kmax({"experiment", name, "--help"}), done);
+    EXPECT_EQ(kmax({"experiment", name, "--help"}), base::done);
     if (output.find("--subjects") == std::string::npos) continue;  // one command for both kinds of device
     for (const std::vector<std::string>& of_device :
          std::vector<std::vector<std::string>>{{"--no-prompt"},
@@ -61,13 +61,13 @@ TEST_F(Experiment, OptionsOfTheOtherKindOfDeviceAreRefused) {
       if (of_device[0] == "--resume" && name == "max-stiffness") continue;  // its people have a journal too
       std::vector<std::string> arguments = {"experiment", name};
       arguments.insert(arguments.end(), of_device.begin(), of_device.end());
-      expect_error(arguments, wrong_usage, of_device[0] + " is for a device; name one with --device");
+      expect_error(arguments, base::wrong_usage, of_device[0] + " is for a device; name one with --device");
     }
-    expect_error({"experiment", name, "--device", "serial:/dev/none", "--subjects", "clipped"}, wrong_usage,
-                 "--subjects is for simulated people; leave --device out");
+    expect_error({"experiment", name, "--device", "serial:/dev/none", "--subjects", "clipped"},
+                 base::wrong_usage, "--subjects is for simulated people; leave --device out");
     expect_error(
         {"experiment", name, "--device", "serial:/dev/none", "--clip", name == "max-stiffness" ? "off" : "0"},
-        wrong_usage, "--clip is for simulated people");
+        base::wrong_usage, "--clip is for simulated people");
   }
 }
 

@@ -20,28 +20,28 @@ class ExperimentStudy : public testing::Test {
 
   std::ostringstream out, messages;
   Context context{out, messages,
-                  [](const std::string&, const link::Notice&) { return std::unique_ptr<link::Link>(); }};
+                  [](const std::string&, const device::Notice&) { return std::unique_ptr<device::Link>(); }};
 };
 
 TEST_F(ExperimentStudy, TheTextIsParagraphsTablesAndTheFilesNames) {
-  EXPECT_EQ(print(), done);
+  EXPECT_EQ(print(), base::done);
   EXPECT_EQ(out.str().rfind("One.\n\nTwo.\n\nA table\n", 0), 0u) << out.str();
   EXPECT_TRUE(out.str().ends_with("\n\nout/a.csv\nout/b.svg\n")) << out.str();
 }
 
 TEST_F(ExperimentStudy, TheDocumentEndsWithTheFiles) {
   context.json = true;
-  EXPECT_EQ(print(), done);
+  EXPECT_EQ(print(), base::done);
   EXPECT_EQ(Json::parse(out.str()),
             (Json{{"origin", "predicted"}, {"files", Json{"out/a.csv", "out/b.svg"}}}));
 }
 
 TEST_F(ExperimentStudy, AClaimThatIsNotMetIsTheAnswerNoWhereThePaperIsExpected) {
-  EXPECT_EQ(print(false), done);
-  EXPECT_EQ(print(true, true), done);
-  EXPECT_EQ(print(false, true), verdict_is_no);
+  EXPECT_EQ(print(false), base::done);
+  EXPECT_EQ(print(true, true), base::done);
+  EXPECT_EQ(print(false, true), base::verdict_is_no);
   context.json = true;
-  EXPECT_EQ(print(false, true), verdict_is_no);
+  EXPECT_EQ(print(false, true), base::verdict_is_no);
 }
 
 TEST_F(ExperimentStudy, FitsIntoATerminal) {
@@ -56,7 +56,7 @@ TEST_F(ExperimentStudy, FitsIntoATerminal) {
 }
 
 TEST_F(ExperimentStudy, ProgressIsShownInItsWords) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   EXPECT_EQ(simulate_study(context, interruption, force_pairs_words,
                            [](const experiment::ProgressReport& progress) {
                              progress(3, 16);
@@ -67,7 +67,7 @@ TEST_F(ExperimentStudy, ProgressIsShownInItsWords) {
 }
 
 TEST_F(ExperimentStudy, SettingsThatAreRefusedAreWrongUsage) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto refuse = [](const experiment::ProgressReport&) -> int {
     throw std::invalid_argument("push harder");
   };
@@ -77,7 +77,7 @@ TEST_F(ExperimentStudy, SettingsThatAreRefusedAreWrongUsage) {
 }
 
 TEST_F(ExperimentStudy, CtrlCEndsASimulation) {
-  const Interruption interruption;
+  const base::Interruption interruption;
   const auto interrupted = [](const experiment::ProgressReport& progress) {
     std::raise(SIGINT);
     progress(1, 16);

@@ -8,7 +8,7 @@ class JitterCommand : public ExperimentCommandLine {
 };
 
 TEST_F(JitterCommand, TheDocumentHasEveryPairAndTheVerdict) {
-  ASSERT_EQ(simulated({"--touches", "1", "--out", in("results"), "--json"}), done) << said;
+  ASSERT_EQ(simulated({"--touches", "1", "--out", in("results"), "--json"}), base::done) << said;
   EXPECT_EQ(keys(),
             (std::vector<std::string>{"origin", "circumstances", "pairs", "verdict", "variations", "files"}));
   const Json all = document();
@@ -28,7 +28,7 @@ TEST_F(JitterCommand, TheDocumentHasEveryPairAndTheVerdict) {
 
 TEST_F(JitterCommand, AHandThatCannotStiffenIsAnswerNo) {
   EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--activation-gain", "0", "--json"}),
-            verdict_is_no)
+            base::verdict_is_no)
       << said;
   EXPECT_EQ(document()["verdict"]["claim_met"], false);
   EXPECT_EQ(document()["verdict"]["jitter_falls"], false);
@@ -37,9 +37,9 @@ TEST_F(JitterCommand, AHandThatCannotStiffenIsAnswerNo) {
 
 TEST_F(JitterCommand, ADeviceIsMeasured) {
   const int code = on_device({"--expect-paper", "--touches", "1", "--window", "0.6", "--json"});
-  ASSERT_TRUE(code == done || code == verdict_is_no) << said;
+  ASSERT_TRUE(code == base::done || code == base::verdict_is_no) << said;
   const Json all = document();
-  EXPECT_EQ(all["verdict"]["claim_met"] == true, code == done);
+  EXPECT_EQ(all["verdict"]["claim_met"] == true, code == base::done);
   EXPECT_EQ(all["origin"], "measured");
   EXPECT_EQ(all["pairs"].size(), 16u);
   EXPECT_CONTAINS(all["circumstances"].get<std::string>(), "force limit 3.3 N");
@@ -49,7 +49,7 @@ TEST_F(JitterCommand, ADeviceIsMeasured) {
 
 // In half a second nobody settles, and a time that nobody has neither falls nor does not.
 TEST_F(JitterCommand, WhatWasNotShownIsNullAndNotNo) {
-  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--window", "0.5", "--json"}), verdict_is_no)
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--window", "0.5", "--json"}), base::verdict_is_no)
       << said;
   const Json verdict = document()["verdict"];
   EXPECT_EQ(verdict["jitter_falls"], true);
@@ -62,7 +62,7 @@ TEST_F(JitterCommand, APersonWhoNeverComesToTheWallIsAFailure) {
   board.axes[0].motion.reset();
   board.axes[0].start.position = 0.02;
   EXPECT_EQ(on_device({"--expect-paper", "--touches", "1", "--window", "0.6", "--patience", "3", "--json"}),
-            failed);
+            base::failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(), "nobody touched the wall within 3 s");
 }
 

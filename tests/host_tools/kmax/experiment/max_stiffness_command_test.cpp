@@ -14,7 +14,7 @@ class MaxStiffness : public SimulatedCommandLine {
                                           "--no-prompt"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return kmax(std::move(arguments),
-                [](const std::string&, const link::Notice&) { return link::make_sim_link(); });
+                [](const std::string&, const device::Notice&) { return device::make_sim_link(); });
   }
   static std::vector<std::string> coarse(std::vector<std::string> more) {
     std::vector<std::string> all = {"--start", "3000", "--step", "1000", "--last", "7000", "--hold", "1"};
@@ -25,7 +25,7 @@ class MaxStiffness : public SimulatedCommandLine {
 
 TEST_F(MaxStiffness, OnADeviceIsTheContractsDocumentAndHasFiles) {
   const int code = on_device(coarse({"--conditions", "2,0", "--out", in("out"), "--json"}));
-  EXPECT_EQ(code, done) << said;
+  EXPECT_EQ(code, base::done) << said;
   EXPECT_EQ(keys(), std::vector<std::string>{"conditions"});
   const Json conditions = document()["conditions"];
   ASSERT_EQ(conditions.size(), 2u);
@@ -50,14 +50,15 @@ TEST_F(MaxStiffness, OnADeviceIsTheContractsDocumentAndHasFiles) {
 }
 
 TEST_F(MaxStiffness, ARunIsResumedFromItsJournalAndWithItsSettingsOnly) {
-  ASSERT_EQ(on_device(coarse({"--conditions", "0", "--out", in("out"), "--json"})), done) << said;
+  ASSERT_EQ(on_device(coarse({"--conditions", "0", "--out", in("out"), "--json"})), base::done) << said;
   const Json first = document();
   const std::string journal = folder.read("out/max_stiffness.journal");
-  EXPECT_EQ(on_device(coarse({"--conditions", "0", "--out", in("out"), "--json", "--resume"})), done) << said;
+  EXPECT_EQ(on_device(coarse({"--conditions", "0", "--out", in("out"), "--json", "--resume"})), base::done)
+      << said;
   EXPECT_EQ(document(), first);
   EXPECT_EQ(folder.read("out/max_stiffness.journal"), journal);
   EXPECT_EQ(on_device(coarse({"--conditions", "0", "--out", in("out"), "--resume", "--trials", "2"})),
-            failed);
+            base::failed);
   EXPECT_CONTAINS(said, "trials was 1 and is 2 now");
 }
 
@@ -65,7 +66,7 @@ TEST_F(MaxStiffness, AWallThatAllowsNoMoreThanThePlainOneIsAnswerNo) {
   // Less than the handle bounces by: no touch of either is stable.
   EXPECT_EQ(on_device({"--expect-paper", "--conditions", "0,2", "--start", "1000", "--step", "1000", "--last",
                        "2000", "--hold", "1", "--abort-amplitude", "1e-5"}),
-            verdict_is_no)
+            base::verdict_is_no)
       << said << output;
   EXPECT_CONTAINS(output, "F_MC = 2 N");
   EXPECT_CONTAINS(output, "none stable");
@@ -75,7 +76,7 @@ TEST_F(MaxStiffness, AWallThatAllowsNoMoreThanThePlainOneIsAnswerNo) {
 TEST_F(MaxStiffness, WallsThatAreStableUpToTheEndAreNotCompared) {
   const std::vector<std::string> arguments = {"--conditions", "0,2",    "--start", "1000",   "--step",
                                               "1000",         "--last", "2000",    "--hold", "1"};
-  EXPECT_EQ(on_device(arguments), done) << said;
+  EXPECT_EQ(on_device(arguments), base::done) << said;
   EXPECT_CONTAINS(output, ">= 2.00");
 }
 
@@ -99,7 +100,7 @@ TEST_F(MaxStiffness, WhatHasNoMeaningOrIsAbsurdIsWrongUsage) {
                                                      {"--abort-amplitude", "0"},
                                                      {"--trials", "0"},
                                                      {"--axis", "2"}})
-    EXPECT_EQ(on_device(bad), wrong_usage) << bad[0] << ": " << said;
+    EXPECT_EQ(on_device(bad), base::wrong_usage) << bad[0] << ": " << said;
   for (const Arguments& bad : std::vector<Arguments>{{"--no-prompt"},
                                                      {"--axis", "1"},
                                                      {"--trials", "2"},
@@ -113,7 +114,7 @@ TEST_F(MaxStiffness, WhatHasNoMeaningOrIsAbsurdIsWrongUsage) {
                                                      {"--conditions", "0,fast"}}) {
     Arguments arguments = {"experiment", "max-stiffness"};
     arguments.insert(arguments.end(), bad.begin(), bad.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << ": " << said;
+    EXPECT_EQ(kmax(arguments), base::wrong_usage) << bad[0] << ": " << said;
   }
 }
 
@@ -126,7 +127,7 @@ TEST_F(MaxStiffness, OfSimulatedPeopleIsTheContractsDocument) {
                                               people.string(), "--conditions",  "0",
                                               "--out",         in("out"),       "--json"};
   const int code = kmax(arguments);
-  ASSERT_EQ(code, done) << said;
+  ASSERT_EQ(code, base::done) << said;
   const Json first = document();
   ASSERT_EQ(first["conditions"].size(), 1u);
   EXPECT_EQ(first["conditions"][0]["subjects"].size(), 2u);
@@ -147,14 +148,15 @@ TEST_F(MaxStiffness, EveryTouchIsAsItIsSetToBe) {
   const auto with = [&](std::vector<std::string> more) {
     std::vector<std::string> arguments = {"experiment", "max-stiffness", "--conditions", "0", "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    EXPECT_EQ(kmax(arguments), done) << said;
+    EXPECT_EQ(kmax(arguments), base::done) << said;
     return document()["conditions"][0]["max_stiffness_n_per_m"].get<double>();
   };
   const double usual = with({});
   EXPECT_LT(with({"--set", "device.delay=1ms"}), 0.8 * usual);
   EXPECT_GT(with({"--set", "wall.damping=4", "--set", "velocity.estimator=difference"}), 1.2 * usual);
   EXPECT_GE(with({"--start", "3000", "--start-adaptive", "5000"}), usual - 100.0);
-  EXPECT_EQ(kmax({"experiment", "max-stiffness", "--conditions", "0", "--set", "haptic.rate=1kHz"}), done);
+  EXPECT_EQ(kmax({"experiment", "max-stiffness", "--conditions", "0", "--set", "haptic.rate=1kHz"}),
+            base::done);
   EXPECT_CONTAINS(output, "Changed for every touch: haptic.rate=1kHz");
   EXPECT_EQ(output.find("alibrated"), std::string::npos) << output;
 }
@@ -164,16 +166,17 @@ TEST_F(MaxStiffness, WhatIsNotToBeSetIsWrongUsage) {
        std::vector<std::pair<std::string, std::string>>{{"wall.stiffness=5000", "--start"},
                                                         {"wall.law=plain", "--conditions"},
                                                         {"device.mass=1t", "mass"}}) {
-    EXPECT_EQ(kmax({"experiment", "max-stiffness", "--set", text}), wrong_usage) << text << ": " << said;
+    EXPECT_EQ(kmax({"experiment", "max-stiffness", "--set", text}), base::wrong_usage)
+        << text << ": " << said;
     EXPECT_CONTAINS(said, why);
   }
   EXPECT_EQ(
       kmax({"experiment", "max-stiffness", "--set", "device.delay=1ms", "--calibrate", "--out", in("x")}),
-      wrong_usage);
+      base::wrong_usage);
   EXPECT_CONTAINS(said, "knows nothing of --set");
-  EXPECT_EQ(on_device({"--set", "device.delay=1ms"}), wrong_usage);
+  EXPECT_EQ(on_device({"--set", "device.delay=1ms"}), base::wrong_usage);
   EXPECT_CONTAINS(said, "is as it is");
-  EXPECT_EQ(on_device({"--set", "haptic.rate=1kHz", "--rate", "500"}), wrong_usage);
+  EXPECT_EQ(on_device({"--set", "haptic.rate=1kHz", "--rate", "500"}), base::wrong_usage);
   EXPECT_CONTAINS(said, "leave one of them out");
 }
 

@@ -19,9 +19,10 @@ class MaxStiffnessOnPeople : public testing::Test {
 
   int measure() {
     std::ostringstream out, messages;
-    Context context(out, messages,
-                    [](const std::string&, const link::Notice&) { return std::unique_ptr<link::Link>(); });
-    const Interruption interruption;
+    Context context(out, messages, [](const std::string&, const device::Notice&) {
+      return std::unique_ptr<device::Link>();
+    });
+    const base::Interruption interruption;
     const int code = run_model_max_stiffness(context, options, interruption);
     output = out.str();
     return code;
@@ -43,16 +44,16 @@ class MaxStiffnessOnPeople : public testing::Test {
 const char* const fitted_to_the_paper = "[fitted]\nplain = 3580.0\nmagnetic = 8410.0\nforce_limit = 3.3\n";
 
 TEST_F(MaxStiffnessOnPeople, TheSuppliedSetsAreCalibrated) {
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_CONTAINS(output, "\"Calibrated\" means");
   options.subjects = "unclipped";
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_TRUE(says_calibrated()) << output;
 }
 
 TEST_F(MaxStiffnessOnPeople, OtherPeopleAreNot) {
   options.seed = 7;
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_FALSE(says_calibrated()) << output;
   EXPECT_CONTAINS(output, "predicted");
 }
@@ -60,13 +61,13 @@ TEST_F(MaxStiffnessOnPeople, OtherPeopleAreNot) {
 TEST_F(MaxStiffnessOnPeople, AnotherForceLimitIsNot) {
   options.subjects = "clipped";
   options.clip = "off";
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_FALSE(says_calibrated()) << output;
 }
 
 TEST_F(MaxStiffnessOnPeople, MoreTouchesThanTheFitHadAreNot) {
   options.phases = 2;
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_FALSE(says_calibrated()) << output;
   EXPECT_CONTAINS(output, "30 touches at every stiffness");
   options.calibrate = true;
@@ -76,13 +77,13 @@ TEST_F(MaxStiffnessOnPeople, MoreTouchesThanTheFitHadAreNot) {
 
 TEST_F(MaxStiffnessOnPeople, AHandWrittenSetIsNotAndNeedNotMeetThePaper) {
   options.subjects = own_set("", 0.5);
-  EXPECT_EQ(measure(), done);
+  EXPECT_EQ(measure(), base::done);
   EXPECT_FALSE(says_calibrated()) << output;
   // The same numbers in a set that says it was fitted have missed.
   options.subjects = own_set(fitted_to_the_paper, 0.5);
-  EXPECT_EQ(measure(), done) << "a result, unless the paper's is expected";
+  EXPECT_EQ(measure(), base::done) << "a result, unless the paper's is expected";
   options.expect_paper = true;
-  EXPECT_EQ(measure(), verdict_is_no);
+  EXPECT_EQ(measure(), base::verdict_is_no);
   EXPECT_TRUE(says_calibrated()) << output;
 }
 

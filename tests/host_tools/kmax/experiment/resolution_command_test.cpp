@@ -8,7 +8,8 @@ class ResolutionCommand : public ExperimentCommandLine {
 };
 
 TEST_F(ResolutionCommand, TheDocumentHasEveryHandAndTheVerdict) {
-  ASSERT_EQ(simulated({"--touches", "1", "--speeds", "0.05,0.3", "--out", in("results"), "--json"}), done)
+  ASSERT_EQ(simulated({"--touches", "1", "--speeds", "0.05,0.3", "--out", in("results"), "--json"}),
+            base::done)
       << said;
   EXPECT_EQ(keys(), (std::vector<std::string>{"origin", "circumstances", "stiffness_n_per_m", "runs",
                                               "verdict", "variations", "files"}));
@@ -30,7 +31,7 @@ TEST_F(ResolutionCommand, TheDocumentHasEveryHandAndTheVerdict) {
 TEST_F(ResolutionCommand, AFirmHandWithoutDelayIsAnswerNo) {
   EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--speeds", "0.05,0.3", "--grip", "1", "--delay",
                        "0", "--json"}),
-            verdict_is_no)
+            base::verdict_is_no)
       << said;
   EXPECT_EQ(document()["verdict"]["coarse_vibrates_at_every_speed"], false);
   EXPECT_TRUE(document()["verdict"]["onset_from_resolution"].is_null());
@@ -38,7 +39,8 @@ TEST_F(ResolutionCommand, AFirmHandWithoutDelayIsAnswerNo) {
 }
 
 TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
-  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--speeds", "0.05", "--json"}), verdict_is_no)
+  EXPECT_EQ(simulated({"--expect-paper", "--touches", "1", "--speeds", "0.05", "--json"}),
+            base::verdict_is_no)
       << said;
   const Json verdict = document()["verdict"];
   EXPECT_EQ(verdict["coarse_vibrates_at_every_speed"], true);
@@ -51,7 +53,8 @@ TEST_F(ResolutionCommand, SpeedsOnOneSideOfTheOnsetLeaveAClaimOpen) {
 
 TEST_F(ResolutionCommand, ADeviceIsMeasured) {
   // The board's person comes at one speed, whatever is asked for: never on both sides of the onset.
-  EXPECT_EQ(on_device({"--expect-paper", "--speeds", "0.1", "--hold", "1", "--json"}), verdict_is_no) << said;
+  EXPECT_EQ(on_device({"--expect-paper", "--speeds", "0.1", "--hold", "1", "--json"}), base::verdict_is_no)
+      << said;
   const Json all = document();
   EXPECT_EQ(all["origin"], "measured");
   ASSERT_EQ(all["runs"].size(), 1u);

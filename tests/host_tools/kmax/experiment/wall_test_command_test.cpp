@@ -10,7 +10,7 @@ TEST_F(WallTestCommand, ThePlainWallIsStableAt1AndUnstableAt6NewtonsPerMillimetr
   ASSERT_EQ(
       kmax({"experiment", "wall-test", "--stiffness", "1000,6000", "--repeats", "2", "--set",
             "haptic.rate=500", "--out", in("wall"), "--date", "2026-01-02", "--commit", "1a2b3c4", "--json"}),
-      done)
+      base::done)
       << said;
   const Json result = document();
   EXPECT_EQ(result["law"], "plain");
@@ -43,7 +43,7 @@ TEST_F(WallTestCommand, TheWallIsTheOneThatIsSet) {
   ASSERT_EQ(
       kmax({"experiment", "wall-test", "--stiffness", "3N/mm", "--repeats", "1", "--hold", "2s", "--set",
             "wall.law=magnetic", "--set", "wall.magnetic_coefficient=2", "--set", "haptic.rate=1kHz"}),
-      done)
+      base::done)
       << said;
   EXPECT_CONTAINS(output, "Wall of law 'magnetic' at 1000 Hz");
   EXPECT_CONTAINS(output, "wall.magnetic_coefficient=2");
@@ -55,7 +55,7 @@ TEST_F(WallTestCommand, BadOptionsAreWrongUsageAndSayWhatIsAllowed) {
   const auto refusal = [&](std::vector<std::string> more) {
     std::vector<std::string> arguments = {"experiment", "wall-test"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << more[1];
+    EXPECT_EQ(kmax(arguments), base::wrong_usage) << more[1];
     return said;
   };
   EXPECT_CONTAINS(refusal({"--stiffness", "3000,2000"}), "2000 N/m stands after 3000 N/m; list them rising");
@@ -74,8 +74,9 @@ TEST_F(WallTestCommand, BadOptionsAreWrongUsageAndSayWhatIsAllowed) {
 TEST_F(WallTestCommand, ADeviceIsNotSimulatedBeside) {
   const std::vector<std::string> arguments = {"experiment",  "wall-test", "--device",     "serial:/dev/none",
                                               "--no-prompt", "--set",     "device.mass=1"};
-  EXPECT_EQ(kmax(arguments, [](const std::string&, const link::Notice&) { return link::make_sim_link(); }),
-            wrong_usage);
+  EXPECT_EQ(
+      kmax(arguments, [](const std::string&, const device::Notice&) { return device::make_sim_link(); }),
+      base::wrong_usage);
   EXPECT_CONTAINS(said, "the device that --device names is as it is");
 }
 
@@ -83,8 +84,9 @@ TEST_F(WallTestCommand, OnADeviceEverybodyTouchesItAsHeDoes) {
   const std::vector<std::string> arguments = {"experiment",  "wall-test",   "--device", "serial:/dev/none",
                                               "--no-prompt", "--stiffness", "1000",     "--repeats",
                                               "1",           "--hold",      "2",        "--json"};
-  ASSERT_EQ(kmax(arguments, [](const std::string&, const link::Notice&) { return link::make_sim_link(); }),
-            done)
+  ASSERT_EQ(
+      kmax(arguments, [](const std::string&, const device::Notice&) { return device::make_sim_link(); }),
+      base::done)
       << said;
   const Json result = document();
   EXPECT_EQ(result["origin"], "measured");

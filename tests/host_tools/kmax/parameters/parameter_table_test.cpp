@@ -9,8 +9,8 @@ namespace kmax::cli::parameter_table_test {
 
 using device::Parameter;
 
-std::vector<std::string> table_of(std::span<const ParameterRow> rows, std::optional<TerminalSize> terminal,
-                                  bool whole_texts) {
+std::vector<std::string> table_of(std::span<const ParameterRow> rows,
+                                  std::optional<base::TerminalSize> terminal, bool whole_texts) {
   std::ostringstream out;
   print_parameter_table(out, rows, terminal, whole_texts);
   std::istringstream in(out.str());
@@ -29,7 +29,8 @@ std::vector<ParameterRow> everything() {
 TEST(ParameterTable, FitsIntoTheTerminal) {
   for (const std::size_t columns : {60u, 80u, 119u, 120u, 200u}) {
     for (const bool whole_texts : {false, true}) {
-      for (const std::string& line : table_of(everything(), TerminalSize{.columns = columns}, whole_texts)) {
+      for (const std::string& line :
+           table_of(everything(), base::TerminalSize{.columns = columns}, whole_texts)) {
         EXPECT_LE(line.size(), columns) << line;
         EXPECT_FALSE(line.ends_with(' ')) << line;
       }
@@ -38,7 +39,8 @@ TEST(ParameterTable, FitsIntoTheTerminal) {
 }
 
 TEST(ParameterTable, OneLineForEachAndAHeading) {
-  for (const auto terminal : {std::optional<TerminalSize>{}, std::optional<TerminalSize>{TerminalSize{}}})
+  for (const auto terminal :
+       {std::optional<base::TerminalSize>{}, std::optional<base::TerminalSize>{base::TerminalSize{}}})
     EXPECT_EQ(table_of(everything(), terminal, false).size(), firmware::slot_count + 1);
 }
 
@@ -57,7 +59,7 @@ TEST(ParameterTable, ElsewhereThanOnATerminalNothingIsCut) {
 TEST(ParameterTable, EveryValueIsWholeAtEightyColumns) {
   const ParameterRow rows[] = {
       {Parameter::of<"wall.adaptive_velocity_max">(1), std::bit_cast<std::uint32_t>(-1.234567e-5f)}};
-  EXPECT_NE(table_of(rows, TerminalSize{}, false)[1].find("*-1.234567e-5  m/s"), std::string::npos);
+  EXPECT_NE(table_of(rows, base::TerminalSize{}, false)[1].find("*-1.234567e-5  m/s"), std::string::npos);
 }
 
 TEST(ParameterTable, MarksWhatIsNotTheDefault) {
@@ -74,7 +76,7 @@ TEST(ParameterTable, MarksWhatIsNotTheDefault) {
 TEST(ParameterTable, WholeTextsLoseNoWord) {
   const ParameterRow rows[] = {{Parameter::of<"velocity.estimator">(), 0}};
   std::string all;
-  for (const std::string& line : table_of(rows, TerminalSize{}, true))
+  for (const std::string& line : table_of(rows, base::TerminalSize{}, true))
     all += line.substr(std::min<std::size_t>(line.find_first_not_of(' '), line.size())) + " ";
   EXPECT_NE(all.find(rows[0].parameter.definition().help), std::string::npos) << all;
   EXPECT_NE(all.find("difference|low_pass|foaw|foaw_end_fit|tracking|edge_period"), std::string::npos) << all;

@@ -14,7 +14,7 @@ using host_tools_test::CapturingLink;
 TEST_F(Capture, WritesATableThatSaysItsUnits) {
   ASSERT_EQ(kmax({"capture", "--channels", "position,velocity,count,flags", "--samples", "50", "--interval",
                   "4", "--out", in("c.csv")}),
-            done)
+            base::done)
       << said;
   EXPECT_CONTAINS(output, "50 samples of axis 0, 0.2 ms apart, 0 of them before the trigger 'now'");
   const plot::CsvTable table = plot::read_csv(in("c.csv"));
@@ -31,7 +31,7 @@ TEST_F(Capture, WritesATableThatSaysItsUnits) {
 }
 
 TEST_F(Capture, WithoutAFileTheTableIsTheOutputAndNothingElse) {
-  ASSERT_EQ(kmax({"capture", "--channels", "force", "--samples", "3"}), done) << said;
+  ASSERT_EQ(kmax({"capture", "--channels", "force", "--samples", "3"}), base::done) << said;
   EXPECT_EQ(output.substr(0, output.find('\n')), "time_s,tick,force_n");
   EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 4);
   EXPECT_CONTAINS(said, "3 samples");
@@ -40,7 +40,7 @@ TEST_F(Capture, WithoutAFileTheTableIsTheOutputAndNothingElse) {
 TEST_F(Capture, AContactWithTheArmedWallShowsBothSidesOfIt) {
   ASSERT_EQ(kmax({"capture", "--channels", "distance,force,flags", "--trigger", "contact", "--pre-trigger",
                   "100", "--samples", "400", "--arm", "--json"}),
-            done)
+            base::done)
       << said;
   const Json document = this->document();
   EXPECT_EQ(document["trigger"], "contact");
@@ -62,18 +62,19 @@ TEST_F(Capture, AContactWithTheArmedWallShowsBothSidesOfIt) {
 }
 
 TEST_F(Capture, NoTriggerIsAFailureThatNamesIt) {
-  expect_error({"capture", "--trigger", "contact", "--timeout", "2"}, failed,
+  expect_error({"capture", "--trigger", "contact", "--timeout", "2"}, base::failed,
                "the trigger 'contact' did not come within 2 s");
 }
 
 TEST_F(Capture, WhatCannotBeMeantIsWrongUsage) {
-  expect_error({"capture", "--channels", "forse"}, wrong_usage, "did you mean force");
-  expect_error({"capture", "--channels", "force,count,supply,flags,distance"}, wrong_usage, "5 channels");
-  expect_error({"capture", "--samples", "3073"}, wrong_usage, "at most 3072");
-  expect_error({"capture", "--samples", "10", "--pre-trigger", "10"}, wrong_usage, "at most 9");
-  expect_error({"capture", "--interval", "0"}, wrong_usage, "capture.interval");
-  expect_error({"capture", "--trigger", "force"}, wrong_usage, "needs --level");
-  expect_error({"capture", "--trigger", "fault", "--level", "1"}, wrong_usage, "not to 'fault'");
+  expect_error({"capture", "--channels", "forse"}, base::wrong_usage, "did you mean force");
+  expect_error({"capture", "--channels", "force,count,supply,flags,distance"}, base::wrong_usage,
+               "5 channels");
+  expect_error({"capture", "--samples", "3073"}, base::wrong_usage, "at most 3072");
+  expect_error({"capture", "--samples", "10", "--pre-trigger", "10"}, base::wrong_usage, "at most 9");
+  expect_error({"capture", "--interval", "0"}, base::wrong_usage, "capture.interval");
+  expect_error({"capture", "--trigger", "force"}, base::wrong_usage, "needs --level");
+  expect_error({"capture", "--trigger", "fault", "--level", "1"}, base::wrong_usage, "not to 'fault'");
   for (const std::vector<std::string>& bad :
        std::vector<std::vector<std::string>>{{"--trigger", "magic"},
                                              {"--trigger", "6"},
@@ -88,20 +89,22 @@ TEST_F(Capture, WhatCannotBeMeantIsWrongUsage) {
                                              {"--axis", "2"}}) {
     std::vector<std::string> arguments = {"capture"};
     arguments.insert(arguments.end(), bad.begin(), bad.end());
-    EXPECT_EQ(kmax(arguments), wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
+    EXPECT_EQ(kmax(arguments), base::wrong_usage) << bad[0] << " " << bad[1] << ": " << said;
   }
 }
 
 TEST_F(Capture, AFileThatCannotBeWrittenIsFoundBeforeAnybodyWaits) {
   EXPECT_EQ(kmax({"capture", "--trigger", "contact", "--timeout", "1000000", "--out", in("no/c.csv")}),
-            failed);
+            base::failed);
   EXPECT_CONTAINS(said, "no/c.csv");
   // And a capture that fails leaves what was there, and nothing where nothing was.
   folder.write("old.csv", "old");
-  EXPECT_EQ(kmax({"capture", "--trigger", "contact", "--timeout", "0.1", "--out", in("old.csv")}), failed);
+  EXPECT_EQ(kmax({"capture", "--trigger", "contact", "--timeout", "0.1", "--out", in("old.csv")}),
+            base::failed);
   std::ifstream old(in("old.csv"));
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(old), {}), "old");
-  EXPECT_EQ(kmax({"capture", "--trigger", "contact", "--timeout", "0.1", "--out", in("new.csv")}), failed);
+  EXPECT_EQ(kmax({"capture", "--trigger", "contact", "--timeout", "0.1", "--out", in("new.csv")}),
+            base::failed);
   EXPECT_FALSE(std::filesystem::exists(in("new.csv")));
 }
 
@@ -109,7 +112,7 @@ TEST_F(Capture, AFileThatCannotBeWrittenIsFoundBeforeAnybodyWaits) {
 struct Watched {
   int kmax(std::vector<std::string> arguments) {
     std::ostringstream out, messages;
-    Context context(out, messages, [this](const std::string&, const link::Notice&) {
+    Context context(out, messages, [this](const std::string&, const device::Notice&) {
       auto made = std::make_unique<CapturingLink>();
       made->before_request = [this, seen = made.get()](int number) {
         if (number != interrupted_request) return;
@@ -137,7 +140,7 @@ struct Watched {
 TEST(CaptureCommand, CtrlCStopsTheCaptureInTheDeviceAndDisarms) {
   Watched watched;
   watched.interrupted_request = 60;
-  EXPECT_EQ(watched.kmax({"capture", "--trigger", "fault", "--arm", "--timeout", "100"}), failed);
+  EXPECT_EQ(watched.kmax({"capture", "--trigger", "fault", "--arm", "--timeout", "100"}), base::failed);
   EXPECT_CONTAINS(watched.said, "interrupted; the capture has been stopped");
   EXPECT_EQ(watched.commands, (std::vector<std::uint16_t>{1, 0}));
   EXPECT_EQ(watched.state_at_end, firmware::CaptureState::idle);

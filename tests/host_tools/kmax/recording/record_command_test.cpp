@@ -19,22 +19,22 @@ struct FakeBus {
 };
 
 /// Gives the four PDOs of node 1, a set every millisecond of its own time, once it is operational.
-class FakePort final : public link::CanPort {
+class FakePort final : public device::CanPort {
  public:
   explicit FakePort(FakeBus& bus) : bus_(bus) {}
   void send(const drivers::CanFrame& frame) override { bus_.sent.push_back(frame); }
-  std::optional<link::Received> receive(std::chrono::microseconds) override {
+  std::optional<device::Received> receive(std::chrono::microseconds) override {
     const int number = bus_.frames++;
     if (bus_.on_frame) bus_.on_frame(number);
     if (number == bus_.raises_signal_at) raise(SIGINT);
-    if (number >= bus_.ends_at) throw link::LinkError("fake0: the interface is gone");
+    if (number >= bus_.ends_at) throw device::LinkError("fake0: the interface is gone");
     if (bus_.first_lost <= number && number <= bus_.last_lost) return std::nullopt;
     const auto tick = static_cast<std::uint32_t>(100 + number / 4 * 20);
     drivers::CanFrame frame{.identifier = 0x181U + 0x100U * static_cast<std::uint32_t>(number % 4),
                             .length = 8};
     if (number % 4 == 3)
       frame.data = {0, 0, 0, 0, 0, 0, static_cast<std::uint8_t>(tick), static_cast<std::uint8_t>(tick >> 8)};
-    return link::Received{frame, std::chrono::microseconds(50) * tick};
+    return device::Received{frame, std::chrono::microseconds(50) * tick};
   }
   int descriptor() const override { return -1; }
   std::string description() const override { return "fake0"; }
@@ -45,7 +45,7 @@ class FakePort final : public link::CanPort {
 
 class RecordCommand : public CommandLineFixture {
  protected:
-  std::unique_ptr<link::Link> open_device(const std::string&, const link::Notice&) override {
+  std::unique_ptr<device::Link> open_device(const std::string&, const device::Notice&) override {
     auto made = std::make_unique<FakeLink>(fake);
     made->before_request = [this](int) {
       for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
@@ -55,7 +55,7 @@ class RecordCommand : public CommandLineFixture {
     return made;
   }
   void prepare(Context& context) override {
-    context.open_bus = [this](const std::string& name, const link::CanPortOptions&) {
+    context.open_bus = [this](const std::string& name, const device::CanPortOptions&) {
       opened = name;
       return std::make_unique<FakePort>(bus);
     };
@@ -69,7 +69,8 @@ class RecordCommand : public CommandLineFixture {
 };
 
 TEST_F(RecordCommand, OverCanItStartsTheNodeRecordsAndPutsItBack) {
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "500ms", "--device", "can:fake0", "--json"}), done) << said;
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "500ms", "--device", "can:fake0", "--json"}), base::done)
+      << said;
   EXPECT_EQ(opened, "fake0");
   ASSERT_EQ(bus.sent.size(), 2u);
   EXPECT_EQ(bus.sent[0], (drivers::CanFrame{.length = 2, .data = {1, 1}}));
@@ -89,7 +90,7 @@ TEST_F(RecordCommand, OverCanItStartsTheNodeRecordsAndPutsItBack) {
 TEST_F(RecordCommand, LostRowsAreSaidAndShowInTheTicks) {
   bus.first_lost = 401;
   bus.last_lost = 407;
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "0.5", "--device", "can:fake0"}), done) << said;
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "0.5", "--device", "can:fake0"}), base::done) << said;
   EXPECT_CONTAINS(output, "497 rows in 0.499 s");
   EXPECT_CONTAINS(output, "3 lost in 1 gap");
 }
@@ -105,7 +106,8 @@ TEST_F(RecordCommand, ThePdosAreAskedForEachMillisecondAndPutBackHoweverItEnds) 
       if (number == 200) meanwhile = time();
     };
     EXPECT_EQ(time(), 10u);
-    EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), ends_at == 400 ? failed : done)
+    EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}),
+              ends_at == 400 ? base::failed : base::done)
         << said;
     EXPECT_EQ(meanwhile, 1u);
     EXPECT_EQ(time(), 10u);
@@ -114,14 +116,14 @@ TEST_F(RecordCommand, ThePdosAreAskedForEachMillisecondAndPutBackHoweverItEnds) 
 
 TEST_F(RecordCommand, CtrlCEndsInOrder) {
   bus.raises_signal_at = 400;
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0", "--json"}), done) << said;
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0", "--json"}), base::done) << said;
   EXPECT_EQ(document()["rows"], 100);
   EXPECT_EQ(bus.sent.size(), 2u);
 }
 
 TEST_F(RecordCommand, ALostBusKeepsTheRowsAndSaysSo) {
   bus.ends_at = 400;
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), failed);
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), base::failed);
   EXPECT_CONTAINS(said, "the interface is gone (" + in("run.csv") + " has what came before: 99 rows");
   EXPECT_EQ(lines(folder.read("run.csv")), 100);
   EXPECT_EQ(bus.sent.size(), 2u);
@@ -130,14 +132,15 @@ TEST_F(RecordCommand, ALostBusKeepsTheRowsAndSaysSo) {
 TEST_F(RecordCommand, AMappingThatWasChangedIsNotRecorded) {
   fake->registers.values().set_whole<"tpdo1.mapped_1">(0x20120120);
   folder.write("run.csv", "precious");
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), failed);
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "can:fake0"}), base::failed);
   EXPECT_CONTAINS(said, "tpdo1.mapped_1 is 0x20120120");
   EXPECT_EQ(opened, "");
   EXPECT_EQ(folder.read("run.csv"), "precious");
 }
 
 TEST_F(RecordCommand, OneAxisToStandardOutput) {
-  EXPECT_EQ(kmax({"record", "-", "--axis", "1", "--for", "0.01", "--device", "can:fake0"}), done) << said;
+  EXPECT_EQ(kmax({"record", "-", "--axis", "1", "--for", "0.01", "--device", "can:fake0"}), base::done)
+      << said;
   EXPECT_TRUE(output.starts_with("time_s,tick,axis1_position_m,"));
   EXPECT_EQ(lines(output), 11);
   EXPECT_CONTAINS(said, "10 rows in 0.009 s");
@@ -145,17 +148,18 @@ TEST_F(RecordCommand, OneAxisToStandardOutput) {
 
 TEST_F(RecordCommand, UsageErrors) {
   for (const char* seconds : {"0", "-1", "nan", "inf"})
-    EXPECT_EQ(kmax({"record", in("run.csv"), "--for", seconds, "--device", "can:fake0"}), wrong_usage)
+    EXPECT_EQ(kmax({"record", in("run.csv"), "--for", seconds, "--device", "can:fake0"}), base::wrong_usage)
         << seconds;
-  EXPECT_EQ(kmax({"record", "-", "--json", "--device", "can:fake0"}), wrong_usage);
-  EXPECT_EQ(kmax({"record"}), wrong_usage);
-  EXPECT_EQ(kmax({"record", in("no/folder.csv"), "--device", "can:fake0"}), failed);
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "tcp:x"}), wrong_usage);
+  EXPECT_EQ(kmax({"record", "-", "--json", "--device", "can:fake0"}), base::wrong_usage);
+  EXPECT_EQ(kmax({"record"}), base::wrong_usage);
+  EXPECT_EQ(kmax({"record", in("no/folder.csv"), "--device", "can:fake0"}), base::failed);
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--device", "tcp:x"}), base::wrong_usage);
   EXPECT_EQ(folder.entries(), 0u);
 }
 
 TEST_F(RecordCommand, OtherLinksArePolled) {
-  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "1", "--device", "serial:/dev/fake", "--json"}), done)
+  EXPECT_EQ(kmax({"record", in("run.csv"), "--for", "1", "--device", "serial:/dev/fake", "--json"}),
+            base::done)
       << said;
   const Json json = document();
   // Two requests of 5 ms each, and the times that the link is lent.

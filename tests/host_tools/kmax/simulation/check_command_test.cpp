@@ -28,16 +28,16 @@ class Check : public SimulatedCommandLine {
 const std::vector<std::string> good = {"guard.damping=5", "guard.friction=1"};
 
 TEST_F(Check, PassIsExitCodeZeroAndFailThree) {
-  EXPECT_EQ(check(good), done) << output;
+  EXPECT_EQ(check(good), base::done) << output;
   EXPECT_CONTAINS(output, "pass: every criterion that applies is met");
-  EXPECT_EQ(check({}), verdict_is_no);
+  EXPECT_EQ(check({}), base::verdict_is_no);
   EXPECT_CONTAINS(output, "no pass");
   EXPECT_CONTAINS(output, "NOT MET");
   EXPECT_CONTAINS(output, "guard.damping at least 0.391 N s/m");
 }
 
 TEST_F(Check, TheDocument) {
-  EXPECT_EQ(check({"guard.damping=1", "haptic.rate=1000", "guard.friction=1"}, {"--json"}), done);
+  EXPECT_EQ(check({"guard.damping=1", "haptic.rate=1000", "guard.friction=1"}, {"--json"}), base::done);
   EXPECT_EQ(document()["pass"], true);
   EXPECT_EQ(document()["criteria"].size(), 9u);
   const Json colgate = criterion("colgate");
@@ -57,7 +57,7 @@ TEST_F(Check, TheDocument) {
   EXPECT_EQ(document()["guaranteed"], true);
   EXPECT_EQ(document()["case"]["period_s"], 0.001);
 
-  EXPECT_EQ(check({}, {"--json"}), verdict_is_no);
+  EXPECT_EQ(check({}, {"--json"}), base::verdict_is_no);
   EXPECT_EQ(document()["pass"], false);
   EXPECT_EQ(criterion("colgate")["margin"], -1e6);
   EXPECT_EQ(criterion("colgate")["changes"][0]["parameter"], "guard.damping");
@@ -66,7 +66,7 @@ TEST_F(Check, TheDocument) {
 
 TEST_F(Check, NoNumberOfTheDocumentIsInfinite) {
   // Where damping suffices the escape speed is unbounded.
-  EXPECT_EQ(check({"guard.damping=5", "guard.friction=1", "guard.operator_speed=1"}, {"--json"}), done);
+  EXPECT_EQ(check({"guard.damping=5", "guard.friction=1", "guard.operator_speed=1"}, {"--json"}), base::done);
   EXPECT_EQ(criterion("diolaiti")["applies"], true);
   EXPECT_TRUE(criterion("diolaiti")["bound"].is_null());
   EXPECT_TRUE(criterion("diolaiti")["margin"].is_null());
@@ -75,7 +75,7 @@ TEST_F(Check, NoNumberOfTheDocumentIsInfinite) {
 
 TEST_F(Check, EachWorthHasItsOwnVerdict) {
   EXPECT_EQ(check({"guard.damping=5", "guard.friction=1", "guard.operator_force=0.01"}, {"--json"}),
-            verdict_is_no);
+            base::verdict_is_no);
   EXPECT_EQ(document()["pass_by_worth"],
             (Json{{"guarantee", true}, {"necessary", true}, {"heuristic", false}}));
 }
@@ -95,18 +95,18 @@ TEST_F(Check, TheExactLinearLimitsAreFoundUpToTheCurrentLoopsDelay) {
 
 TEST_F(Check, TheEstimatorDecidesWhetherADamperIsGuaranteed) {
   const std::vector<std::string> set = {"guard.damping=5", "guard.friction=1", "wall.damping=0.5"};
-  EXPECT_EQ(check(set), done);
+  EXPECT_EQ(check(set), base::done);
   EXPECT_CONTAINS(output, "No guarantee covers wall.damping with this velocity");
   EXPECT_EQ(output.find("Stable with every passive hand"), std::string::npos);
   std::vector<std::string> covered = set;
   covered.push_back("velocity.estimator=difference");
-  EXPECT_EQ(check(covered), done);
+  EXPECT_EQ(check(covered), base::done);
   EXPECT_CONTAINS(output, "Stable with every passive hand");
   EXPECT_EQ(said.find("not judged by any criterion"), std::string::npos) << said;
   // Half of f_c is a step of the damper: 0.16 N s/m by 0.0383 mm in 0.05 ms are 0.123 N.
   covered = {"guard.damping=5", "guard.friction=0.12", "wall.damping=0.16", "velocity.estimator=difference",
              "wall.stiffness=100"};
-  EXPECT_EQ(check(covered), verdict_is_no);
+  EXPECT_EQ(check(covered), base::verdict_is_no);
   EXPECT_EQ(output.find("Stable with every passive hand"), std::string::npos);
 }
 
@@ -124,55 +124,55 @@ TEST_F(Check, AHandIsNamedOrReadFromAFile) {
   check(set, {"--json", "--hand", file});
   EXPECT_NE(criterion("sampled_eigenvalues")["bound"].get<double>(), subject);
   folder.write("bad.toml", "[operator]\ngrip_damping = -3\n");
-  expect_error({"check", "--hand", in("bad.toml")}, wrong_usage, "bad.toml:2:");
-  expect_error({"check", "--hand", "subject_99"}, wrong_usage, "none, subject_1");
+  expect_error({"check", "--hand", in("bad.toml")}, base::wrong_usage, "bad.toml:2:");
+  expect_error({"check", "--hand", "subject_99"}, base::wrong_usage, "none, subject_1");
 }
 
 TEST_F(Check, TheAxisAndItsParametersCount) {
-  EXPECT_EQ(check({"axis1.guard.damping=5", "axis1.guard.friction=1"}, {"--axis", "1"}), done);
-  EXPECT_EQ(check({"guard.damping=5", "guard.friction=1"}, {"--axis", "1"}), done);
-  EXPECT_EQ(check({"axis0.guard.damping=5", "axis0.guard.friction=1"}, {"--axis", "1"}), verdict_is_no);
+  EXPECT_EQ(check({"axis1.guard.damping=5", "axis1.guard.friction=1"}, {"--axis", "1"}), base::done);
+  EXPECT_EQ(check({"guard.damping=5", "guard.friction=1"}, {"--axis", "1"}), base::done);
+  EXPECT_EQ(check({"axis0.guard.damping=5", "axis0.guard.friction=1"}, {"--axis", "1"}), base::verdict_is_no);
   EXPECT_CONTAINS(said, "guard.damping is not judged by any criterion of axis 1");
 }
 
 TEST_F(Check, NothingIsSetOnTheDevice) {
   check(good);
-  EXPECT_EQ(check({}), verdict_is_no) << "a second look finds the defaults";
+  EXPECT_EQ(check({}), base::verdict_is_no) << "a second look finds the defaults";
 }
 
 TEST_F(Check, Explanations) {
-  EXPECT_EQ(kmax({"check", "--explain"}), done);
+  EXPECT_EQ(kmax({"check", "--explain"}), base::done);
   for (const auto& text : check::all_criteria()) EXPECT_CONTAINS(output, text.name());
   EXPECT_CONTAINS(output, "F_MC");
-  EXPECT_EQ(kmax({"check", "--explain", "gil"}), done);
+  EXPECT_EQ(kmax({"check", "--explain", "gil"}), base::done);
   EXPECT_CONTAINS(output, "Gil");
   EXPECT_EQ(output.find("Abbott"), std::string::npos);
-  EXPECT_EQ(kmax({"check", "--explain", "gil", "colgate", "--json"}), done);
+  EXPECT_EQ(kmax({"check", "--explain", "gil", "colgate", "--json"}), base::done);
   EXPECT_EQ(document()["criteria"].size(), 2u);
   EXPECT_EQ(document()["criteria"][0]["relation"], "<");
-  expect_error({"check", "--explain", "colgat"}, wrong_usage, "criteria are colgate, gil");
-  EXPECT_EQ(kmax({"check", "--help"}), done);
+  expect_error({"check", "--explain", "colgat"}, base::wrong_usage, "criteria are colgate, gil");
+  EXPECT_EQ(kmax({"check", "--help"}), base::done);
   EXPECT_CONTAINS(output, "--explain");
 }
 
 TEST_F(Check, BadParametersAreWrongUsage) {
   const auto set = [](const char* one) { return std::vector<std::string>{"check", "--set", one}; };
-  expect_error(set("wall.stifness=1"), wrong_usage, "did you mean wall.stiffness");
-  expect_error(set("wall.stiffness=-1"), wrong_usage, "below");
-  expect_error(set("wall.stiffness=nan"), wrong_usage, "wall.stiffness");
-  expect_error(set("wall.stiffness"), wrong_usage, "wall.stiffness");
-  expect_error(set("measured.position=1"), wrong_usage, "read");
-  expect_error(set("haptic.rate=333"), wrong_usage, "20000");
-  expect_error({"check", "--axis", "2"}, wrong_usage, "axis");
-  expect_error({"check", "--device", "nonsense"}, wrong_usage, "nonsense");
-  EXPECT_EQ(check({"wall.adaptive_force_min=3"}), wrong_usage) << "above wall.adaptive_force_max";
+  expect_error(set("wall.stifness=1"), base::wrong_usage, "did you mean wall.stiffness");
+  expect_error(set("wall.stiffness=-1"), base::wrong_usage, "below");
+  expect_error(set("wall.stiffness=nan"), base::wrong_usage, "wall.stiffness");
+  expect_error(set("wall.stiffness"), base::wrong_usage, "wall.stiffness");
+  expect_error(set("measured.position=1"), base::wrong_usage, "read");
+  expect_error(set("haptic.rate=333"), base::wrong_usage, "20000");
+  expect_error({"check", "--axis", "2"}, base::wrong_usage, "axis");
+  expect_error({"check", "--device", "nonsense"}, base::wrong_usage, "nonsense");
+  EXPECT_EQ(check({"wall.adaptive_force_min=3"}), base::wrong_usage) << "above wall.adaptive_force_max";
 }
 
 TEST_F(Check, AMapAsPictureAndTable) {
   std::vector<std::string> arguments =
       map("wall.stiffness=0.1N/mm..10N/mm:log,12", "guard.damping=0.1..5,10");
   arguments.insert(arguments.end(), {"--csv", in("map.csv"), "--json", "--set", "guard.friction=0.3"});
-  EXPECT_EQ(kmax(arguments), done) << said;
+  EXPECT_EQ(kmax(arguments), base::done) << said;
   EXPECT_EQ(document()["points"], 120);
   EXPECT_EQ(document()["picture"], in("map.svg"));
   const Json passing = document()["points_that_pass"];
@@ -187,33 +187,34 @@ TEST_F(Check, AMapAsPictureAndTable) {
 }
 
 TEST_F(Check, AMapOfWhatDoesNotMatterSaysSo) {
-  EXPECT_EQ(kmax(map("wall.stiffness=100..1000,4", "force.ramp_time=0..1,4")), done);
+  EXPECT_EQ(kmax(map("wall.stiffness=100..1000,4", "force.ramp_time=0..1,4")), base::done);
   EXPECT_CONTAINS(said, "force.ramp_time changes no criterion");
 }
 
 TEST_F(Check, BadMapsAreWrongUsageAndLeaveNothing) {
   const std::string x = "wall.stiffness=100..1000,4", y = "guard.damping=0..1,4";
-  expect_error(map(x, "guard.dampin=0..1"), wrong_usage, "did you mean guard.damping");
-  expect_error(map(x, "guard.damping=1..0"), wrong_usage, "FROM must be below TO");
-  expect_error(map(x, "wall.law=0..3"), wrong_usage, "is not a real number");
-  expect_error(map(x, "encoder.counts_per_turn=1000..2000"), wrong_usage, "is not a real number");
-  expect_error(map(x, "measured.position=0..1"), wrong_usage, "can only be read");
-  expect_error(map(x, "guard.damping=0..2000"), wrong_usage, "1000");
-  expect_error(map(x, "guard.damping=0..1:log"), wrong_usage, "above 0");
-  expect_error(map(x, "guard.damping=0..1,1"), wrong_usage, "from 2 to 1000");
-  expect_error(map(x, "guard.damping"), wrong_usage, "NAME=FROM..TO");
-  expect_error(map(x, x), wrong_usage, "both sides are wall.stiffness");
-  expect_error(map(x, "axis0.wall.stiffness=1..2"), wrong_usage, "both sides");
-  expect_error({"check", "--map", x, "--picture", in("a.svg")}, wrong_usage, "two sides");
-  expect_error({"check", "--map", x, "--map", y, "--map", x, "--picture", in("a.svg")}, wrong_usage,
+  expect_error(map(x, "guard.dampin=0..1"), base::wrong_usage, "did you mean guard.damping");
+  expect_error(map(x, "guard.damping=1..0"), base::wrong_usage, "FROM must be below TO");
+  expect_error(map(x, "wall.law=0..3"), base::wrong_usage, "is not a real number");
+  expect_error(map(x, "encoder.counts_per_turn=1000..2000"), base::wrong_usage, "is not a real number");
+  expect_error(map(x, "measured.position=0..1"), base::wrong_usage, "can only be read");
+  expect_error(map(x, "guard.damping=0..2000"), base::wrong_usage, "1000");
+  expect_error(map(x, "guard.damping=0..1:log"), base::wrong_usage, "above 0");
+  expect_error(map(x, "guard.damping=0..1,1"), base::wrong_usage, "from 2 to 1000");
+  expect_error(map(x, "guard.damping"), base::wrong_usage, "NAME=FROM..TO");
+  expect_error(map(x, x), base::wrong_usage, "both sides are wall.stiffness");
+  expect_error(map(x, "axis0.wall.stiffness=1..2"), base::wrong_usage, "both sides");
+  expect_error({"check", "--map", x, "--picture", in("a.svg")}, base::wrong_usage, "two sides");
+  expect_error({"check", "--map", x, "--map", y, "--map", x, "--picture", in("a.svg")}, base::wrong_usage,
                "two sides");
-  expect_error({"check", "--map", x, "--map", y}, wrong_usage, "--picture");
-  expect_error({"check", "--picture", in("a.svg")}, wrong_usage, "--map");
-  expect_error({"check", "--map", x, "--map", y, "--picture", in("a.gif")}, wrong_usage,
+  expect_error({"check", "--map", x, "--map", y}, base::wrong_usage, "--picture");
+  expect_error({"check", "--picture", in("a.svg")}, base::wrong_usage, "--map");
+  expect_error({"check", "--map", x, "--map", y, "--picture", in("a.gif")}, base::wrong_usage,
                "must end in .svg or .png");
-  expect_error({"check", "--map", x, "--map", y, "--picture", in("no/a.svg")}, wrong_usage, "does not exist");
-  expect_error({"check", "--map", x, "--map", y, "--csv", in("no/a.csv")}, failed, "cannot be written");
-  expect_error({"check", "--explain", "--map", x, "--map", y}, wrong_usage, "do not go together");
+  expect_error({"check", "--map", x, "--map", y, "--picture", in("no/a.svg")}, base::wrong_usage,
+               "does not exist");
+  expect_error({"check", "--map", x, "--map", y, "--csv", in("no/a.csv")}, base::failed, "cannot be written");
+  expect_error({"check", "--explain", "--map", x, "--map", y}, base::wrong_usage, "do not go together");
   EXPECT_EQ(folder.entries(), 0u);
 }
 

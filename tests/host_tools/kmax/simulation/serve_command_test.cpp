@@ -12,19 +12,19 @@ namespace kmax::cli::serve_command_test {
 using Serve = SimulatedCommandLine;
 
 TEST_F(Serve, WhatCannotBeServedIsSaidAtOnce) {
-  expect_error({"serve"}, wrong_usage, "--serial LINK or --can IFACE is needed");
-  expect_error({"serve", "--can", "no_such_interface"}, failed, "no_such_interface");
-  expect_error({"serve", "--serial", in("line"), "--scene", "tuoch"}, wrong_usage, "supplied are");
+  expect_error({"serve"}, base::wrong_usage, "--serial LINK or --can IFACE is needed");
+  expect_error({"serve", "--can", "no_such_interface"}, base::failed, "no_such_interface");
+  expect_error({"serve", "--serial", in("line"), "--scene", "tuoch"}, base::wrong_usage, "supplied are");
   folder.write("line", "precious");
-  expect_error({"serve", "--serial", in("line")}, failed, "something else has this name");
+  expect_error({"serve", "--serial", in("line")}, base::failed, "something else has this name");
   EXPECT_EQ(folder.read("line"), "precious");
-  expect_error({"serve", "--serial", in("no/line")}, failed, "cannot be made");
+  expect_error({"serve", "--serial", in("no/line")}, base::failed, "cannot be made");
   EXPECT_EQ(folder.entries(), 1u);
 }
 
 TEST_F(Serve, AStoreThatCannotBeUsedIsSaidAndLeftAlone) {
   folder.write("notes", "precious");
-  expect_error({"serve", "--serial", in("line"), "--store", in("notes")}, failed, "is 8 bytes long");
+  expect_error({"serve", "--serial", in("line"), "--store", in("notes")}, base::failed, "is 8 bytes long");
   EXPECT_EQ(folder.read("notes"), "precious");
   EXPECT_EQ(folder.entries(), 1u);
 }
@@ -37,7 +37,7 @@ TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
     while (!std::filesystem::is_symlink(folder / "line") && std::chrono::steady_clock::now() < patience)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     try {
-      const auto link = link::open_link(link::parse_device_address("serial:" + in("line")));
+      const auto link = device::open_link(device::parse_device_address("serial:" + in("line")));
       // A device that is held up says nothing in time, which ends the list of what it is.
       do identity = link->identify();
       while (!identity.contains("model_name") && std::chrono::steady_clock::now() < patience);
@@ -48,7 +48,7 @@ TEST_F(Serve, ADeviceIsThereUntilItIsToldToEnd) {
   });
   // Against the signal reaching a program that does not serve (yet).
   const auto previous = std::signal(SIGTERM, SIG_IGN);
-  EXPECT_EQ(kmax({"serve", "--serial", in("line"), "--json"}), done) << said;
+  EXPECT_EQ(kmax({"serve", "--serial", in("line"), "--json"}), base::done) << said;
   user.join();
   std::signal(SIGTERM, previous);
   EXPECT_EQ(problem, "");
@@ -66,9 +66,9 @@ TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
     while (!std::filesystem::exists(folder / "bus") && std::chrono::steady_clock::now() < patience)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     try {
-      link::CanPortOptions options;
+      device::CanPortOptions options;
       options.send_patience = std::chrono::seconds(60);
-      link::UnixCan sleeping(in("bus")), sender(in("bus"), options);
+      device::UnixCan sleeping(in("bus")), sender(in("bus"), options);
       drivers::CanFrame frame;
       frame.identifier = 0x700;
       for (int i = 0; i < 50'000; ++i) sender.send(frame);
@@ -78,7 +78,7 @@ TEST_F(Serve, FramesThatAClientDidNotFetchAreTold) {
     kill(getpid(), SIGTERM);
   });
   const auto previous = std::signal(SIGTERM, SIG_IGN);
-  EXPECT_EQ(kmax({"serve", "--can", in("bus")}), done) << said;
+  EXPECT_EQ(kmax({"serve", "--can", in("bus")}), base::done) << said;
   user.join();
   std::signal(SIGTERM, previous);
   EXPECT_EQ(problem, "");

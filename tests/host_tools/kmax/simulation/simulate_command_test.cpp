@@ -16,7 +16,7 @@ class Simulate : public SimulatedCommandLine {
 TEST_F(Simulate, DocumentTableAndPicture) {
   EXPECT_EQ(kmax({"simulate", scene("haptic.rate = 500\n"), "--csv", in("r.csv"), "--picture", in("r.svg"),
                   "--json"}),
-            done);
+            base::done);
   EXPECT_EQ(keys(),
             (std::vector<std::string>{"scene", "integrator", "parts", "state", "fault", "samples", "contact",
                                       "alarms", "first_alarm_s", "limited_share", "clipped_share",
@@ -36,10 +36,10 @@ TEST_F(Simulate, DocumentTableAndPicture) {
 }
 
 TEST_F(Simulate, ASuppliedSceneWithAPersonIsJudged) {
-  EXPECT_EQ(kmax({"simulate", "touch", "--json"}), done);
+  EXPECT_EQ(kmax({"simulate", "touch", "--json"}), base::done);
   EXPECT_EQ(document()["contact"]["verdict"], "unstable");
   EXPECT_GT(document()["contact"]["peak_to_peak_m"].get<double>(), 0.165e-3);
-  EXPECT_EQ(kmax({"simulate", "touch"}), done);
+  EXPECT_EQ(kmax({"simulate", "touch"}), base::done);
   EXPECT_CONTAINS(output, "held contact: unstable");
   EXPECT_CONTAINS(output, "  integrator: exact\n");
   EXPECT_CONTAINS(output, "  axis 0 integrates: device, hand and arm, activation\n");
@@ -53,7 +53,7 @@ TEST_F(Simulate, TwoAxesAndAStructureHaveTheirColumns) {
                  "[axis1.device]\nstart_position = 0.02\n[parameters]\nhaptic.rate = 500\n"
                  "axis1.haptic.rate = 1000\n[integrator]\nkind = \"rk4\"\n")
           .string();
-  EXPECT_EQ(kmax({"simulate", two, "--csv", in("r.csv"), "--picture", in("r.svg")}), done);
+  EXPECT_EQ(kmax({"simulate", two, "--csv", in("r.csv"), "--picture", in("r.svg")}), base::done);
   EXPECT_CONTAINS(output, "  integrator: rk4, 10 substeps per 2 ms\n");
   EXPECT_CONTAINS(output, "  axis 0 integrates: device, structure\n");
   EXPECT_CONTAINS(output, "  axis 1 integrates: device\n");
@@ -65,28 +65,29 @@ TEST_F(Simulate, TwoAxesAndAStructureHaveTheirColumns) {
 }
 
 TEST_F(Simulate, LostEdgesAreTold) {
-  EXPECT_EQ(kmax({"simulate", "noisy_encoder"}), done);
+  EXPECT_EQ(kmax({"simulate", "noisy_encoder"}), base::done);
   EXPECT_CONTAINS(output, "edges of the encoder lost\n");
   EXPECT_CONTAINS(output, "encoder noise, encoder dropouts\n");
 }
 
 TEST_F(Simulate, BadScenes) {
-  expect_error({"simulate"}, wrong_usage, "a SCENE is missing: a TOML file, or one of compliant_structure, ");
-  expect_error({"simulate", "tuoch"}, wrong_usage, "supplied are compliant_structure, dc_coreless_a, ");
-  expect_error({"simulate", scene("wall.stifness = 1\n")}, wrong_usage, "scene.toml:5:");
-  expect_error({"simulate", scene("wall.stiffness = -1\n")}, wrong_usage, "scene.toml:5:");
-  expect_error({"simulate", scene("measured.position = 0.0\n")}, wrong_usage, "can only be read");
-  expect_error({"simulate", scene("haptic.rate = 333\n")}, wrong_usage, "[parameters] haptic.rate");
-  expect_error({"simulate", scene("= 5\n")}, wrong_usage, "scene.toml:5:");
-  expect_error({"simulate", scene("wall.position = 0.02\n")}, failed, "could not be armed: ");
+  expect_error({"simulate"}, base::wrong_usage,
+               "a SCENE is missing: a TOML file, or one of compliant_structure, ");
+  expect_error({"simulate", "tuoch"}, base::wrong_usage, "supplied are compliant_structure, dc_coreless_a, ");
+  expect_error({"simulate", scene("wall.stifness = 1\n")}, base::wrong_usage, "scene.toml:5:");
+  expect_error({"simulate", scene("wall.stiffness = -1\n")}, base::wrong_usage, "scene.toml:5:");
+  expect_error({"simulate", scene("measured.position = 0.0\n")}, base::wrong_usage, "can only be read");
+  expect_error({"simulate", scene("haptic.rate = 333\n")}, base::wrong_usage, "[parameters] haptic.rate");
+  expect_error({"simulate", scene("= 5\n")}, base::wrong_usage, "scene.toml:5:");
+  expect_error({"simulate", scene("wall.position = 0.02\n")}, base::failed, "could not be armed: ");
 }
 
 TEST_F(Simulate, BadOutputs) {
   const std::string good = scene("");
-  expect_error({"simulate", good, "--picture", in("r.gif")}, wrong_usage, "must end in .svg or .png");
-  expect_error({"simulate", good, "--picture", in("no/r.svg")}, wrong_usage, "does not exist");
-  expect_error({"simulate", good, "--csv", in("no/r.csv")}, failed, "r.csv: cannot be written");
-  expect_error({"simulate", good, "--csv", folder.path().string()}, failed, "cannot be written");
+  expect_error({"simulate", good, "--picture", in("r.gif")}, base::wrong_usage, "must end in .svg or .png");
+  expect_error({"simulate", good, "--picture", in("no/r.svg")}, base::wrong_usage, "does not exist");
+  expect_error({"simulate", good, "--csv", in("no/r.csv")}, base::failed, "r.csv: cannot be written");
+  expect_error({"simulate", good, "--csv", folder.path().string()}, base::failed, "cannot be written");
 }
 
 TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
@@ -96,7 +97,7 @@ TEST_F(Simulate, ARunThatEndsInAFaultIsAFailureWithItsResult) {
                  "duration = 0.1\n[device]\nstart_position = 0.05\nstart_velocity = -1.0\n"
                  "[parameters]\nvelocity.limit = 0.5\n")
           .string();
-  EXPECT_EQ(kmax({"simulate", fast, "--json"}), failed);
+  EXPECT_EQ(kmax({"simulate", fast, "--json"}), base::failed);
   EXPECT_CONTAINS(said, "the run ended in a fault of the axis");
   EXPECT_EQ(document()["fault"], "over_speed");
   EXPECT_EQ(document()["state"], "fault");
@@ -107,7 +108,7 @@ TEST_F(Simulate, ASettingStandsInPlaceOfWhatTheSceneSays) {
     std::vector<std::string> arguments{"simulate", scene("haptic.rate = 500\n"), "--csv", in("r.csv")};
     settings.push_back("device.friction=0.01");
     for (const std::string& one : settings) arguments.insert(arguments.end(), {"--set", one});
-    EXPECT_EQ(kmax(arguments), done) << said;
+    EXPECT_EQ(kmax(arguments), base::done) << said;
     return folder.read("r.csv");
   };
   const std::string plain = table({"device.start_velocity=-30cm/s"});
@@ -115,14 +116,14 @@ TEST_F(Simulate, ASettingStandsInPlaceOfWhatTheSceneSays) {
   EXPECT_TRUE(plain != table({"device.start_velocity=-30cm/s", "device.damping=1"}));
   EXPECT_TRUE(plain != table({"device.start_velocity=-30cm/s", "wall.stiffness=3N/mm"}));
   EXPECT_TRUE(plain == table({"axis0.device.start_velocity=-0.3", "axis0.wall.stiffness=1N/mm"}));
-  EXPECT_EQ(kmax({"simulate", scene(""), "--set", "duration=100ms", "--json"}), done);
+  EXPECT_EQ(kmax({"simulate", scene(""), "--set", "duration=100ms", "--json"}), base::done);
   EXPECT_EQ(document()["samples"], 2000);
 }
 
 TEST_F(Simulate, ASceneMaySayItsNumbersWithUnits) {
   const auto table = [&](const std::string& text) {
     const std::string path = folder.write("u.toml", "duration = 0.05\n" + text).string();
-    EXPECT_EQ(kmax({"simulate", path, "--csv", in("r.csv")}), done) << said;
+    EXPECT_EQ(kmax({"simulate", path, "--csv", in("r.csv")}), base::done) << said;
     return folder.read("r.csv");
   };
   EXPECT_TRUE(table("[device]\nmass = 0.06\nstart_position = 0.005\nstart_velocity = -0.2\n") ==
@@ -132,11 +133,11 @@ TEST_F(Simulate, ASceneMaySayItsNumbersWithUnits) {
 TEST_F(Simulate, ThePersonAimsAtAWallThatIsSetWithAUnit) {
   EXPECT_EQ(kmax({"simulate", "touch", "--set", "wall.position=5mm", "--set", "wall.law=none", "--set",
                   "motion.hold_time=1.5s", "--json"}),
-            done);
+            base::done);
   const Json with_unit = document()["contact"];
   EXPECT_EQ(kmax({"simulate", "touch", "--set", "wall.position=0.005", "--set", "wall.law=none", "--set",
                   "motion.hold_time=1.5", "--json"}),
-            done);
+            base::done);
   EXPECT_EQ(document()["contact"], with_unit);
   EXPECT_NE(with_unit["verdict"], "no_contact");
 }
@@ -145,23 +146,24 @@ TEST_F(Simulate, SettingsThatCannotBeMeant) {
   const auto set = [&](const std::string& one) {
     return std::vector<std::string>{"simulate", scene(""), "--set", one};
   };
-  expect_error(set("operator.grip_stifness=800"), wrong_usage,
+  expect_error(set("operator.grip_stifness=800"), base::wrong_usage,
                "'operator.grip_stifness' is neither a key of a scene nor a parameter; did you mean "
                "operator.grip_stiffness");
-  expect_error(set("wall.stifness=800"), wrong_usage, "did you mean wall.stiffness");
-  expect_error(set("sed=2"), wrong_usage, "did you mean seed");
-  expect_error(set("operator.grip_stiffness=800"), wrong_usage,
+  expect_error(set("wall.stifness=800"), base::wrong_usage, "did you mean wall.stiffness");
+  expect_error(set("sed=2"), base::wrong_usage, "did you mean seed");
+  expect_error(set("operator.grip_stiffness=800"), base::wrong_usage,
                "--set operator.grip_stiffness=800: " + in("scene.toml") + " has no [operator]");
-  expect_error(set("axis1.device.mass=1"), wrong_usage, "has no [axis1.device]");
-  expect_error(set("device.mass=60kgg"), wrong_usage, "'kgg' is not one of its units kg, g");
-  expect_error(set("device.mass=-1"), wrong_usage, "allowed is a number from 0.0001 to 100 kg");
-  expect_error(set("wall.stiffness=1kg"), wrong_usage, "'kg' is not one of its units N/m");
-  expect_error(set("wall.law=magnetik"), wrong_usage, "did you mean magnetic");
-  expect_error(set("identified=perhaps"), wrong_usage, "allowed is true or false");
-  expect_error(set("seed=-1"), wrong_usage, "a whole number from 0");
-  expect_error(set("integrator.kind=rk5"), wrong_usage, "did you mean rk4");
-  expect_error(set("device.mass"), wrong_usage, "write NAME=VALUE");
-  expect_error({"simulate", scene(""), "--set", "seed=1", "--set", "seed=2"}, wrong_usage, "given twice");
+  expect_error(set("axis1.device.mass=1"), base::wrong_usage, "has no [axis1.device]");
+  expect_error(set("device.mass=60kgg"), base::wrong_usage, "'kgg' is not one of its units kg, g");
+  expect_error(set("device.mass=-1"), base::wrong_usage, "allowed is a number from 0.0001 to 100 kg");
+  expect_error(set("wall.stiffness=1kg"), base::wrong_usage, "'kg' is not one of its units N/m");
+  expect_error(set("wall.law=magnetik"), base::wrong_usage, "did you mean magnetic");
+  expect_error(set("identified=perhaps"), base::wrong_usage, "allowed is true or false");
+  expect_error(set("seed=-1"), base::wrong_usage, "a whole number from 0");
+  expect_error(set("integrator.kind=rk5"), base::wrong_usage, "did you mean rk4");
+  expect_error(set("device.mass"), base::wrong_usage, "write NAME=VALUE");
+  expect_error({"simulate", scene(""), "--set", "seed=1", "--set", "seed=2"}, base::wrong_usage,
+               "given twice");
 }
 
 TEST_F(Simulate, ANameOfBothIsTheScenesUnlessSaidOtherwise) {
@@ -169,7 +171,7 @@ TEST_F(Simulate, ANameOfBothIsTheScenesUnlessSaidOtherwise) {
   const auto run = [&](const std::string& one) {
     EXPECT_EQ(kmax({"simulate", scene(""), "--set", "device.start_velocity=-0.1", "--set", one, "--csv",
                     in("r.csv")}),
-              done)
+              base::done)
         << said;
     return folder.read("r.csv");
   };
@@ -178,19 +180,19 @@ TEST_F(Simulate, ANameOfBothIsTheScenesUnlessSaidOtherwise) {
 }
 
 TEST_F(Simulate, AMotorThatIsNotCalibratedSaysWhatToDo) {
-  expect_error({"simulate", "gimbal_a"}, failed, "'kmax simulate gimbal_a --set identified=true'");
+  expect_error({"simulate", "gimbal_a"}, base::failed, "'kmax simulate gimbal_a --set identified=true'");
   EXPECT_CONTAINS(said, "'kmax serve --scene gimbal_a --serial /tmp/kmax'");
-  EXPECT_EQ(kmax({"simulate", "gimbal_a", "--set", "identified=true", "--set", "duration=0.1"}), done)
+  EXPECT_EQ(kmax({"simulate", "gimbal_a", "--set", "identified=true", "--set", "duration=0.1"}), base::done)
       << said;
 }
 
 TEST_F(Simulate, TheKeysAreAPageOrADocument) {
-  EXPECT_EQ(kmax({"simulate", "--keys"}), done);
+  EXPECT_EQ(kmax({"simulate", "--keys"}), base::done);
   EXPECT_CONTAINS(output, "\n## [operator], per axis\n");
   EXPECT_CONTAINS(output, "\n| `grip_stiffness` | N/m | 540 | 1 .. 1e7 | k1, stiffness of the grip |\n");
-  EXPECT_EQ(kmax({"simulate", "--keys", "--json"}), done);
+  EXPECT_EQ(kmax({"simulate", "--keys", "--json"}), base::done);
   EXPECT_EQ(document()["keys"][0]["key"], "name");
-  expect_error({"simulate", "touch", "--keys"}, wrong_usage, "give it alone");
+  expect_error({"simulate", "touch", "--keys"}, base::wrong_usage, "give it alone");
 }
 
 }  // namespace kmax::cli::simulate_command_test

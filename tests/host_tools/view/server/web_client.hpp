@@ -110,7 +110,7 @@ class WebClient {
     return true;
   }
 
-  link::FileDescriptor socket_;
+  base::FileDescriptor socket_;
   std::string received_;
 };
 

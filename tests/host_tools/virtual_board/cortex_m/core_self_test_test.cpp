@@ -91,7 +91,7 @@ std::string image_path() {
 }
 
 struct SelfTestBoard {
-  explicit SelfTestBoard(const ElfImage& image, ProcessorConfig config)
+  explicit SelfTestBoard(const base::ElfImage& image, ProcessorConfig config)
       : core(bus, clocks, 82), processor(bus, core, clocks, config), loop(processor) {
     clocks.core = 2;
     timer.processor = &processor;
@@ -99,7 +99,7 @@ struct SelfTestBoard {
     bus.attach(0x4000'0000, 0x400, "TIM2", timer);
     bus.attach(usart2_base, 0x400, "USART2", printer);
     loop.add(core.system_tick);
-    for (const ElfSegment& segment : image.segments()) {
+    for (const base::ElfSegment& segment : image.segments()) {
       const auto place = bus.memory(segment.address, segment.bytes.size());
       EXPECT_EQ(place.size(), segment.bytes.size());
       std::memcpy(place.data(), segment.bytes.data(), place.size());
@@ -130,7 +130,7 @@ class CoreSelfTest : public ::testing::Test {
 };
 
 Lines run_on_virtual_board(ProcessorConfig config) {
-  SelfTestBoard board(ElfImage::load(image_path()), config);
+  SelfTestBoard board(base::ElfImage::load(image_path()), config);
   const RunEnd end = board.run();
   EXPECT_EQ(end, RunEnd::stopped) << board.processor.fault() << "\n" << board.printer.text;
   EXPECT_EQ(board.processor.breakpoint(), end_of_program);
