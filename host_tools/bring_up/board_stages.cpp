@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "firmware/drive/profile_readings.hpp"
+#include "host_tools/bench/power_stage.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/selftest/selftest.hpp"
@@ -174,8 +174,9 @@ namespace {
 CheckResult offsets(device::Device& device, std::size_t axis, const Report* cold) {
   // The DRV8301's 4 mV, and its drift on the worst board, 15 uV/degC, doubled since the thermistor is not
   // beside it: both guesses, its data sheet was not at hand (drivers/current_sense.hpp).
-  constexpr double shunt = board::odrive_v3::description.shunt, largest = 4e-3 / shunt,
-                   steepest = 2.0 * 15e-6 / shunt, least_warming = 5.0;
+  constexpr double least_warming = 5.0;
+  const double shunt = bench::power_stage_of(device).shunt, largest = 4e-3 / shunt,
+               steepest = 2.0 * 15e-6 / shunt;
   CheckResult check{"amplifier offsets"};
   const auto number = [&](const char* name) {
     return device.read_number(fmt::format("axis{}.measured.{}", axis, name));

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
+#include "host_tools/bench/power_stage.hpp"
 #include "host_tools/calibration/step.hpp"
 #include "host_tools/device/disarm_failure.hpp"
 #include "host_tools/device/store.hpp"
@@ -118,7 +119,8 @@ void require_ready(device::Device& device, std::size_t axis) {
         fmt::format("axis {} has a fault: {}; then 'kmax clear'", axis, status.fault_words()));
 }
 
-MotorKnowledge knowledge_of(Bench& bench, const CalibrationSettings& settings) {
+MotorKnowledge knowledge_of(Bench& bench, const CalibrationSettings& settings,
+                            const board::BoardDescription& electronics) {
   MotorKnowledge known;
   known.supply = bench.number("supply.voltage");
   if (known.supply <= 0.0)
@@ -126,6 +128,7 @@ MotorKnowledge knowledge_of(Bench& bench, const CalibrationSettings& settings) {
         "there is nothing to calibrate: this device measures no supply and no currents, its force comes from "
         "an ideal source (supply.voltage reads 0); to try it on a simulated motor, start 'kmax serve --scene "
         "gimbal_a --serial LINK' and calibrate the device at LINK");
+  known.electronics = &electronics;
   known.kind = static_cast<firmware::MotorKind>(bench.number("motor.kind"));
   known.tick = 1.0 / bench.number("info.tick_rate");
   known.current_limit = bench.number("current.limit");
@@ -286,9 +289,10 @@ std::string restore(Bench& bench) {
   return trouble + "not put back: switch the device off and on before 'kmax save'";
 }
 
-void run_steps(Calibration& run, const StepStarted& started, CalibrationReport& report) {
+void run_steps(Calibration& run, const board::BoardDescription& electronics, const StepStarted& started,
+               CalibrationReport& report) {
   run.bench.begin();
-  run.known = knowledge_of(run.bench, run.settings);
+  run.known = knowledge_of(run.bench, run.settings, electronics);
   // What is to be identified must not be corrected meanwhile.
   run.bench.set_temporary({"compensation.dead_time=0", "compensation.limit=0"});
   // Under an encoder that has died its velocity is 0 after 16 samples; the edge period's falls as one over
@@ -327,11 +331,13 @@ CalibrationReport calibrate(device::Device& device, const CalibrationSettings& s
                             const std::function<void(const std::string&)>& progress,
                             const StepStarted& started) {
   require_ready(device, settings.axis);
+  // Before anything is changed.
+  const board::BoardDescription& electronics = bench::power_stage_of(device);
   CalibrationReport report;
   Bench bench(device, settings.axis, settings.travel, progress);
   try {
     Calibration run{bench, settings, prompter};
-    run_steps(run, started, report);
+    run_steps(run, electronics, started, report);
     bench.disarm();
     if (!report.pass() || settings.dry_run) {
       bench.journal().put_back();

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "board/odrive_v3/description.hpp"
+#include "board/description.hpp"
 #include "firmware/drive/motor_control.hpp"
 #include "host_tools/bench/bench.hpp"
 #include "host_tools/calibration/estimate.hpp"
@@ -30,8 +30,7 @@ using bench::Waveforms;
 // What is known of the axis: at first what its parameters say, later what the steps have found.
 struct MotorKnowledge {
   firmware::MotorKind kind = firmware::MotorKind::dc;
-  // Of the boards with a bridge the only one so far.
-  const board::BoardDescription* electronics = &board::odrive_v3::description;
+  const board::BoardDescription* electronics = nullptr;
   double tick = 50e-6;         // s
   double supply = 0.0;         // V
   double current_limit = 0.0;  // A
