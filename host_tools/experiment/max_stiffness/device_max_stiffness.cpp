@@ -80,18 +80,17 @@ RunJournal::Json journal_settings(device::Device& device, const TouchLimits& lim
                          {"changed", settings.touch.changes.words()},
                          {"hold_time_s", settings.touch.hold_time},
                          {"threshold_m", settings.touch.threshold},
-                         {"start_n_per_m", settings.start},
-                         {"start_adaptive_n_per_m", settings.start_adaptive},
-                         {"step_n_per_m", settings.step},
-                         {"last_n_per_m", settings.last},
+                         {"start_n_per_m", settings.steps.first},
+                         {"start_adaptive_n_per_m", settings.steps.first_of(true)},
+                         {"step_n_per_m", settings.steps.step},
+                         {"last_n_per_m", settings.steps.last},
                          {"trials", settings.trials}});
 }
 
 DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& condition,
                                          const DeviceStiffnessSettings& settings) {
   DeviceStiffnessResult result{condition, {}, {}};
-  StiffnessClimb climb(condition.adaptive() ? settings.start_adaptive : settings.start, settings.step,
-                       settings.last);
+  StiffnessClimb climb(settings.steps, condition.adaptive());
   while (const auto stiffness = climb.next()) {
     bool stable = true;
     double limited = 0.0;

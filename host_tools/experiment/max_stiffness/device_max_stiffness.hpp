@@ -8,8 +8,6 @@
 // that was interrupted goes on with the next one.
 
 #include <filesystem>
-#include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -22,12 +20,13 @@
 namespace kmax::experiment {
 
 struct DeviceStiffnessSettings {
-  ContactSettings touch;                                 ///< its stiffness has no meaning here
-  double start = paper::search_start;                    ///< N/m, of a constant coefficient
-  double start_adaptive = paper::search_start_adaptive;  ///< N/m
-  double step = paper::stiffness_step;                   ///< N/m
-  double last = 20e3;                                    ///< N/m; the search ends there
-  std::size_t trials = 1;                                ///< touches at each stiffness
+  ContactSettings touch;  ///< its stiffness has no meaning here
+  StiffnessSteps steps{.first = paper::search_start,
+                       .step = paper::stiffness_step,
+                       .last = 20e3,
+                       .first_adaptive = paper::search_start_adaptive,
+                       .goes_down = true};
+  std::size_t trials = 1;  ///< touches at each stiffness
 };
 
 struct DeviceStiffnessTouch {
@@ -65,58 +64,6 @@ DeviceStiffnessResult find_max_stiffness(Rig& rig, const StiffnessCondition& con
 /// than the plain wall. Conditions that have not been measured say nothing, nor do those whose search ended
 /// before an unstable touch (beyond_last, never_touched).
 bool order_is_the_papers(const std::vector<DeviceStiffnessResult>& results);
-
-// Paper 1's way to the largest stable stiffness (section 4.2): from a start in equal steps upwards until a
-// touch is unstable; the last stable stiffness is the result. A start that is already unstable, which the
-// paper does not speak of, is left downwards until a touch is stable.
-
-class StiffnessClimb {
- public:
-  /// N/m: 0 < step, 0 < first <= last. Throws std::invalid_argument.
-  StiffnessClimb(double first, double step, double last) : first_(first), step_(step), last_(last) {
-    if (!(step > 0.0 && first > 0.0 && last >= first && last <= 1e7))
-      throw std::invalid_argument(
-          "the stiffness search needs a start and a step above 0, and an end from the start to 1e7 N/m");
-  }
-
-  /// The stiffness to touch next, N/m; none: the search is over.
-  std::optional<double> next() const {
-    if (given_up_ || (unstable_seen_ && stable_seen_)) return std::nullopt;
-    const double stiffness = at(number_);
-    if (stiffness > last_ * (1.0 + 1e-12) || stiffness < rounding * step_) return std::nullopt;
-    return stiffness;
-  }
-
-  /// What next() has been found to be.
-  void record(bool stable) {
-    if (stable) {
-      stable_seen_ = true;
-      best_ = at(number_);
-    } else {
-      unstable_seen_ = true;
-    }
-    number_ += unstable_seen_ ? -1 : 1;
-  }
-
-  /// Ends the search where it is: the touches say nothing any more.
-  void give_up() { given_up_ = true; }
-
-  /// The largest stable stiffness so far, N/m; 0: none was.
-  double result() const { return best_; }
-  /// Nothing was unstable up to the end.
-  bool beyond_last() const { return stable_seen_ && !unstable_seen_ && !given_up_ && !next(); }
-
- private:
-  /// Of a step: what is left of it where the way down ends at 0.
-  static constexpr double rounding = 1e-9;
-  /// Counted in steps, so that they add no rounding.
-  double at(int number) const { return first_ + step_ * number; }
-
-  double first_, step_, last_;
-  int number_ = 0;
-  bool stable_seen_ = false, unstable_seen_ = false, given_up_ = false;
-  double best_ = 0.0;
-};
 
 /// A row for each condition: K_max beside the paper's, each with where it comes from.
 report::Table device_stiffness_table(const std::vector<DeviceStiffnessResult>& results);

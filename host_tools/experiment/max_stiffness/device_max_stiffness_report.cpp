@@ -96,8 +96,8 @@ std::vector<std::string> device_stiffness_words(const DeviceStiffnessSettings& s
   std::vector<std::string> words = {
       fmt::format("Largest stable stiffness on {}, axis {}, at {:g} Hz: from {:g} N/mm ({:g} N/mm for "
                   "adaptive walls) in steps of {:g} N/mm, {} at each, held for {:g} s.",
-                  device, limits.axis, touch.haptic_rate, settings.start / 1000,
-                  settings.start_adaptive / 1000, settings.step / 1000,
+                  device, limits.axis, touch.haptic_rate, settings.steps.first / 1000,
+                  settings.steps.first_of(true) / 1000, settings.steps.step / 1000,
                   settings.trials == 1 ? "one touch" : fmt::format("{} touches", settings.trials),
                   touch.hold_time),
       fmt::format(

@@ -9,20 +9,13 @@
 namespace kmax::experiment {
 namespace {
 
-void require(const TouchProtocol& protocol, const StiffnessSteps& steps) {
+void require(const TouchProtocol& protocol) {
   if (protocol.touches() == 0)
     throw std::invalid_argument("no touch: name at least one approach speed, one push force and one phase");
   if (!(protocol.threshold > 0.0 && protocol.force_threshold >= 0.0))
     throw std::invalid_argument(fmt::format(
         "thresholds of {} m and {} N peak to peak: allowed are above 0, and 0 (not used) or above",
         protocol.threshold, protocol.force_threshold));
-  const double first_adaptive = steps.first_adaptive.value_or(steps.first);
-  if (!(steps.first > 0.0 && first_adaptive > 0.0 && steps.step > 0.0 && steps.growth >= 0.0 &&
-        steps.last >= std::max(steps.first, first_adaptive) && steps.last <= 1e7))
-    throw std::invalid_argument(
-        fmt::format("stiffness from {} N/m (adaptive {}) by {} N/m (or {} of it) to {} N/m: allowed are "
-                    "steps above 0 and an end from the first one to 1e7 N/m",
-                    steps.first, first_adaptive, steps.step, steps.growth, steps.last));
 }
 
 void require_shared_touches(std::span<const TouchProtocol> protocols) {
@@ -41,6 +34,7 @@ void require_shared_touches(std::span<const TouchProtocol> protocols) {
 /// How far one protocol has come.
 struct Search {
   const TouchProtocol& protocol;
+  StiffnessClimb climb;
   MaxStiffness result{};
   // At the present stiffness.
   double saturated = 0.0;
@@ -57,8 +51,7 @@ class TouchesOfStiffness {
           std::make_shared<simulation::PropagatorTable>(setup.device, setup.person, study_gain_bits);
   }
 
-  /// Leaves in each search whether it found this stiffness unstable; if not, and if there was a touch, its
-  /// result has this stiffness.
+  /// Each search goes on from what it found at this stiffness, which all of them were to touch next.
   void touch(double stiffness, std::span<Search* const> searches) {
     touch_.wall.wall.stiffness = static_cast<float>(stiffness);
     std::size_t phases = 1;
@@ -78,11 +71,13 @@ class TouchesOfStiffness {
       }
     }
     for (Search* search : searches) {
-      if (search->unstable) continue;
       search->result.never_touched = !search->touched;
-      if (!search->touched) continue;
-      search->result.stiffness = stiffness;
-      search->result.saturated_share = search->saturated;
+      if (!search->touched) {
+        search->climb.give_up();
+        continue;
+      }
+      search->climb.record(!search->unstable);
+      if (!search->unstable) search->result.saturated_share = search->saturated;
     }
   }
 
@@ -126,18 +121,6 @@ class TouchesOfStiffness {
   std::vector<TouchJudgement> judgements_;
 };
 
-/// Below a first stiffness that is unstable.
-void go_down(TouchesOfStiffness& touches, double first, double step, Search& search) {
-  Search* const alone[] = {&search};
-  for (std::uint64_t n = 1;; ++n) {
-    const double stiffness = first - step * static_cast<double>(n);
-    // Of a step: what is left of it where the way down ends at 0.
-    if (stiffness < 1e-9 * step) break;
-    touches.touch(stiffness, alone);
-    if (!search.unstable) break;
-  }
-}
-
 }  // namespace
 
 MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& protocol,
@@ -148,30 +131,27 @@ MaxStiffness search_max_stiffness(const TouchSetup& setup, const TouchProtocol& 
 std::vector<MaxStiffness> search_max_stiffness_by_each(const TouchSetup& setup,
                                                        std::span<const TouchProtocol> protocols,
                                                        const StiffnessSteps& steps) {
-  for (const TouchProtocol& protocol : protocols) require(protocol, steps);
+  for (const TouchProtocol& protocol : protocols) require(protocol);
   require_shared_touches(protocols);
+  const StiffnessClimb climb(steps, control::follows_velocity(setup.wall.wall.kind));
   std::vector<Search> searches;
-  for (const TouchProtocol& protocol : protocols) searches.push_back({protocol});
-  std::vector<Search*> climbing;
-  for (Search& search : searches) climbing.push_back(&search);
+  for (const TouchProtocol& protocol : protocols) searches.push_back({protocol, climb});
   TouchesOfStiffness touches(setup);
-  const bool adaptive = control::follows_velocity(setup.wall.wall.kind);
-  const double first = adaptive ? steps.first_adaptive.value_or(steps.first) : steps.first;
-  // Counted in steps, so that thousands of them add no rounding.
-  double stiffness = first;
-  for (std::uint64_t n = 1; !climbing.empty() && stiffness <= steps.last * (1.0 + 1e-12); ++n) {
-    touches.touch(stiffness, climbing);
-    std::erase_if(climbing, [&](Search* search) {
-      const bool ends = search->unstable || search->result.never_touched;
-      if (search->unstable && n == 1 && steps.goes_down) go_down(touches, first, steps.step, *search);
-      return ends;
-    });
-    stiffness = steps.growth * stiffness > steps.step ? stiffness * (1.0 + steps.growth)
-                                                      : first + steps.step * static_cast<double>(n);
+  for (Search& search : searches) {
+    while (const auto stiffness = search.climb.next()) {
+      // Those that have come as far share its touches.
+      std::vector<Search*> together;
+      for (Search& other : searches)
+        if (other.climb.next() == stiffness) together.push_back(&other);
+      touches.touch(*stiffness, together);
+    }
   }
-  for (Search* search : climbing) search->result.beyond_last = true;
   std::vector<MaxStiffness> results;
-  for (const Search& search : searches) results.push_back(search.result);
+  for (Search& search : searches) {
+    search.result.stiffness = search.climb.result();
+    search.result.beyond_last = search.climb.beyond_last();
+    results.push_back(search.result);
+  }
   return results;
 }
 

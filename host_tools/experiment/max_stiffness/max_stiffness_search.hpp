@@ -7,10 +7,10 @@
 // nothing. The stiffness is not found by halving: whether a wall is stable need not change once only.
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "host_tools/experiment/max_stiffness/stiffness_climb.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 
 namespace kmax::experiment {
@@ -29,19 +29,6 @@ struct TouchProtocol {
     const bool by_force = force_threshold > 0.0;
     return {by_force, by_force ? force_threshold : threshold};
   }
-};
-
-// The default begins far below the paper's 3.0 N/mm (5.0 for the adaptive wall): for a third of the simulated
-// people the plain wall is unstable there already, and a search from there says nothing of what lies below.
-struct StiffnessSteps {
-  double first = 1000.0;  // N/m
-  double step = 100.0;    // N/m: paper 1's
-  double growth = 0.0;    // >= 0: a step of at least this share of the stiffness, for wide ranges
-  double last = 40e3;     // N/m: the search ends there
-  std::optional<double> first_adaptive{};  // N/m, of a law that follows the velocity; none: the first
-  // From a first stiffness that is unstable in equal steps downwards, to the largest one that is not; else
-  // the result is 0 there. The paper does not say what it did.
-  bool goes_down = false;
 };
 
 struct MaxStiffness {

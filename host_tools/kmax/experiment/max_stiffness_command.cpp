@@ -96,8 +96,8 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
 
   on_device = command.add_option_group("Device", "With --device");
   add_axis_option(*on_device, context, "Axis that the wall is on");
-  add_quantity(*on_device, "--step", device.step, "N/m", "Step, N/m", 1.0, 1e6);
-  add_quantity(*on_device, "--last", device.last, "N/m", "The search ends there, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--step", device.steps.step, "N/m", "Step, N/m", 1.0, 1e6);
+  add_quantity(*on_device, "--last", device.steps.last, "N/m", "The search ends there, N/m", 1.0, 1e6);
   add_number(*on_device, "--trials", device.trials, "Touches at each stiffness; one unstable touch decides",
              1, 1000);
   rate = add_quantity(*on_device, "--rate", device.touch.haptic_rate, "Hz", "Rate of the haptic loop, Hz",
@@ -126,8 +126,8 @@ int run_max_stiffness(Context& context, const MaxStiffnessOptions& given) {
     return run_model_max_stiffness(context, options, interruption);
   }
   require_none(options.simulated->get_options(), for_simulated_people);
-  options.device.start = options.start.value_or(options.device.start);
-  options.device.start_adaptive = options.start_adaptive.value_or(options.device.start_adaptive);
+  options.device.steps.first = options.start.value_or(options.device.steps.first);
+  if (options.start_adaptive) options.device.steps.first_adaptive = options.start_adaptive;
   change_touches(options.device.touch, options.changes, *options.rate);
   return run_device_max_stiffness(context, options, interruption);
 }

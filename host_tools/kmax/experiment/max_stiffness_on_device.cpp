@@ -43,9 +43,9 @@ int run_device_max_stiffness(Context& context, const MaxStiffnessOptions& option
   limits.axis = context.axis();
   const auto conditions = conditions_for(options.conditions);
   for (const auto& condition : conditions) {
-    if (settings.last < (condition.adaptive() ? settings.start_adaptive : settings.start))
+    if (settings.steps.last < settings.steps.first_of(condition.adaptive()))
       throw UsageError(
-          fmt::format("--last {} is below the first stiffness of '{}'", settings.last, condition.name));
+          fmt::format("--last {} is below the first stiffness of '{}'", settings.steps.last, condition.name));
   }
   make_folder(options.files);
   device::Device device = context.connect();

@@ -243,8 +243,8 @@ TEST_F(DisturbedTouches, AnOscillationIsAVerdictAndNotRepeated) {
 TEST_F(DisturbedTouches, TheSearchForTheLargestStiffnessEndsWhereItWould) {
   DeviceStiffnessSettings settings;
   settings.touch = contact;
-  settings.start = 3000;
-  settings.step = 500;
+  settings.steps.first = 3000;
+  settings.steps.step = 500;
   StiffnessCondition plain;
   plain.name = "plain";
   const auto search = [&] {
