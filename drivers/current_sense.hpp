@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "drivers/analog_converter.hpp"
+
 // Phase current from the code of a shunt amplifier: low-side shunt, amplifier with a mid-point output,
 // converter with the same reference. Arithmetic alone; who converts is not its business.
 //
@@ -37,11 +39,13 @@ struct CurrentSenseConfig {
 class CurrentSense {
  public:
   static constexpr float middle_code = 2048.0F;
-  static constexpr float reference_volt = 3.3F;  ///< of the converter and of the amplifier
+  static constexpr float reference_volt =
+      static_cast<float>(converter_reference);  ///< of the converter and of the amplifier
 
   /// Two divisions: not for the interrupt path.
   constexpr explicit CurrentSense(const CurrentSenseConfig& config)
-      : amperes_per_code_(reference_volt / 4096.0F / (gain_factor(config.gain) * config.shunt_ohm)) {}
+      : amperes_per_code_(reference_volt / static_cast<float>(converter_codes) /
+                          (gain_factor(config.gain) * config.shunt_ohm)) {}
 
   /// The code at zero current, from OffsetCalibration.
   constexpr void set_offset(float code) { offset_ = origin_ = code; }
@@ -98,7 +102,8 @@ namespace detail {
 /// By gain, as CurrentSenseGain counts them; made by the compiler.
 inline constexpr std::size_t gains = 4;
 inline constexpr auto offset_window = [] {
-  constexpr float input_offset_volt = 0.004F, codes_per_volt = 4096.0F / CurrentSense::reference_volt;
+  constexpr float input_offset_volt = 0.004F,
+                  codes_per_volt = static_cast<float>(converter_codes) / CurrentSense::reference_volt;
   std::array<std::uint16_t, gains> codes{};
   for (unsigned gain = 0; gain < gains; ++gain) {
     const float off = input_offset_volt * gain_factor(static_cast<CurrentSenseGain>(gain)) * codes_per_volt;

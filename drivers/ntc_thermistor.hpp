@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 
+#include "drivers/analog_converter.hpp"
+
 // Temperature of an NTC thermistor from the converter's reference (top) to the tap, with a resistor from the
 // tap to ground: ratiometric, the reference voltage cancels.
 //
@@ -67,8 +69,10 @@ class NtcThermistor {
       : open_below_(config.open_below), shorted_above_(config.shorted_above) {
     for (unsigned i = 0; i <= segments; ++i) {
       // The ends have no temperature (R infinite or zero): the nearest code that has.
-      const double code = i == 0 ? 1.0 : i == segments ? 4095.0 : static_cast<double>(i * step);
-      const double resistance = config.ground_resistor_ohm * (4096.0 / code - 1.0);
+      const double code = i == 0          ? 1.0
+                          : i == segments ? converter_codes - 1.0
+                                          : static_cast<double>(i * step);
+      const double resistance = config.ground_resistor_ohm * (converter_codes / code - 1.0);
       const double inverse = 1.0 / 298.15 + detail::natural_logarithm(resistance / config.resistance_25_ohm) /
                                                 config.beta_kelvin;
       table_[i] = static_cast<float>(1.0 / inverse - 273.15);
@@ -84,10 +88,10 @@ class NtcThermistor {
 
  private:
   static constexpr unsigned step = 32;
-  static constexpr unsigned segments = 4096 / step;
+  static constexpr unsigned segments = converter_codes / step;
 
   constexpr float celsius(std::uint16_t code) const {
-    const unsigned bounded = code > 4095U ? 4095U : code;
+    const unsigned bounded = std::uint32_t{code} >= converter_codes ? converter_codes - 1 : code;
     const unsigned i = bounded / step;
     const float fraction = static_cast<float>(bounded % step) * (1.0F / step);
     return table_[i] + (table_[i + 1] - table_[i]) * fraction;

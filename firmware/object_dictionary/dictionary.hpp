@@ -15,6 +15,7 @@
 namespace kmax::firmware {
 
 inline constexpr std::uint32_t tick_rate_hz = 20000;
+inline constexpr double tick_interval = 1.0 / tick_rate_hz;  ///< s
 
 /// All that exists once per axis: settings, then readings.
 inline constexpr auto axis_entries = []<std::size_t... i>(std::index_sequence<i...>) {

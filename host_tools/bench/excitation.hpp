@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/drive/fault.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/bench/still_watch.hpp"
 
 namespace kmax::bench {
@@ -54,7 +55,7 @@ struct Trip {
 
 /// Samples of a capture, by the channels' names.
 struct Waveforms {
-  double interval = 50e-6;  ///< s between samples
+  double interval = firmware::tick_interval;  ///< s between samples
   std::map<std::string, std::vector<double>> channels;
   std::size_t before = 0;         ///< samples before the first tick; fewer than asked for if it came soon
   std::optional<Trip> trip;       ///< then they may be short or empty

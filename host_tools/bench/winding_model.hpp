@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "firmware/object_dictionary/dictionary.hpp"
+
 namespace kmax::bench {
 
 struct WindingParameters {
@@ -28,10 +30,10 @@ struct WindingParameters {
 inline constexpr double motion_decay = 0.01;
 
 struct WindingInput {
-  std::span<const double> voltage;  // V, [k] acts from k + 1/2 to k + 3/2
-  std::span<const double> speed;    // rad/s, mean of the tick from k to k + 1; optional
-  double mean_current = 0.0;        // A, about which motion_rate integrates
-  double tick = 50e-6;              // s
+  std::span<const double> voltage;        // V, [k] acts from k + 1/2 to k + 3/2
+  std::span<const double> speed;          // rad/s, mean of the tick from k to k + 1; optional
+  double mean_current = 0.0;              // A, about which motion_rate integrates
+  double tick = firmware::tick_interval;  // s
 };
 
 // Writes samples 1 .. of `current` (as long as `voltage`); sample 0 is set to sample 1, since the voltage

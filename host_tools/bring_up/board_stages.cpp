@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "board/odrive_v3/voltage_variant.hpp"
+#include "drivers/analog_converter.hpp"
 #include "firmware/drive/profile_readings.hpp"
 #include "host_tools/bench/power_stage.hpp"
 #include "host_tools/bring_up/bring_up.hpp"
@@ -116,10 +117,9 @@ CheckResult check_clock(device::Device& device) {
 /// reading at the end of the converter's range, which follows from the variant's ceiling, is no measurement.
 CheckResult check_divider(double measured, std::optional<double> meter, double ceiling) {
   using namespace board::odrive_v3;
-  constexpr double reference = 3.3;  // V, of the converter
   CheckResult check{"supply divider"};
   for (const VoltageVariant variant : {VoltageVariant::v24, VoltageVariant::v56}) {
-    const double end = reference * static_cast<double>(supply_divider_ratio(variant));
+    const double end = drivers::converter_reference * static_cast<double>(supply_divider_ratio(variant));
     const PartRatings parts = part_ratings(variant);
     if (std::abs(ceiling - static_cast<double>(supply_ceiling(variant))) > 0.01 || measured < 0.995 * end)
       continue;

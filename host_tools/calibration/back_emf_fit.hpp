@@ -27,6 +27,7 @@
 #include <limits>
 #include <span>
 
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/calibration/estimate.hpp"
 
 namespace kmax::calibration {
@@ -40,7 +41,7 @@ struct BackEmfRecord {
 };
 
 struct BackEmfConfig {
-  double tick = 50e-6;  // s
+  double tick = firmware::tick_interval;  // s
   bool synchronous = false;
   int pole_pairs = 1;
   double inductance = 0.0;                                            // H, along q

@@ -30,6 +30,7 @@
 
 #include <span>
 
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/calibration/estimate.hpp"
 
 namespace kmax::calibration {
@@ -41,7 +42,7 @@ struct CoggingSweep {
 };
 
 struct CoggingFitConfig {
-  double interval = 50e-6;  // s between samples
+  double interval = firmware::tick_interval;  // s between samples
   double counts_per_turn = 4000.0;
   int least_periods = 2;  // per shaft turn
   int most_periods = 400;

@@ -25,6 +25,7 @@
 
 #include <span>
 
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/calibration/estimate.hpp"
 
 namespace kmax::calibration {
@@ -42,10 +43,10 @@ struct MotionRecord {
 };
 
 struct MotionFitConfig {
-  double interval = 50e-6;       // s between samples (capture.interval x tick)
-  double count_length = 16e-6;   // m per count
-  double width = 0.0;            // s of a bump; 0: chosen as said above
-  double unsure_share = 0.15;    // of a bump's weight
+  double interval = firmware::tick_interval;  // s between samples (capture.interval x tick)
+  double count_length = 16e-6;                // m per count
+  double width = 0.0;                         // s of a bump; 0: chosen as said above
+  double unsure_share = 0.15;                 // of a bump's weight
   double transmission = 0.0;     // m/rad; with cogging_periods: a cogging force is fitted along (2 harmonics)
   double cogging_periods = 0.0;  // per shaft turn
 };

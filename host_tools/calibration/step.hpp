@@ -14,6 +14,7 @@
 
 #include "board/description.hpp"
 #include "firmware/drive/motor_control.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/bench/bench.hpp"
 #include "host_tools/calibration/estimate.hpp"
 #include "host_tools/calibration/procedure.hpp"
@@ -31,10 +32,10 @@ using bench::Waveforms;
 struct MotorKnowledge {
   firmware::MotorKind kind = firmware::MotorKind::dc;
   const board::BoardDescription* electronics = nullptr;
-  double tick = 50e-6;         // s
-  double supply = 0.0;         // V
-  double current_limit = 0.0;  // A
-  double transmission = 0.0;   // m per rad of the shaft
+  double tick = firmware::tick_interval;  // s
+  double supply = 0.0;                    // V
+  double current_limit = 0.0;             // A
+  double transmission = 0.0;              // m per rad of the shaft
   double counts_per_turn = 0.0;
   int direction = 1;  // encoder.direction
   int pole_pairs = 1;

@@ -39,6 +39,7 @@
 
 #include <span>
 
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/calibration/estimate.hpp"
 
 namespace kmax::calibration {
@@ -54,9 +55,9 @@ struct WindingRecord {
 enum class WindingMotion { standing, free };
 
 struct WindingFitConfig {
-  double tick = 50e-6;             // s
-  double pwm_frequency = 20000.0;  // Hz
-  double switching_legs = 2.0;     // legs whose dead time makes V_dt: 2 brushed, 4/3 synchronous
+  double tick = firmware::tick_interval;  // s
+  double pwm_frequency = 20000.0;         // Hz
+  double switching_legs = 2.0;            // legs whose dead time makes V_dt: 2 brushed, 4/3 synchronous
   // False where the current that is measured does not make the dead time's voltage: across a bias that keeps
   // the signs of the phase currents.
   bool fit_dead_time = true;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/bench/bench.hpp"
 #include "host_tools/selftest/evidence.hpp"
 
@@ -76,7 +77,7 @@ class Probe {
   device::Device& device_;
   bench::Bench bench_;
   std::optional<FaultAtStart> fault_at_start_;
-  double count_length_ = 0.0, first_count_ = 0.0, tick_ = 50e-6;
+  double count_length_ = 0.0, first_count_ = 0.0, tick_ = firmware::tick_interval;
   double largest_displacement_ = 0.0;
 };
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "firmware/drive/fault.hpp"
+#include "firmware/object_dictionary/dictionary.hpp"
 #include "host_tools/device/device.hpp"
 
 namespace kmax::selftest {
@@ -20,7 +21,7 @@ struct AxisFacts {
   double current_limit = 5.0;
   double mass = 0.05, transmission = 0.05;
   double counts_per_turn = 8192, count_length = 1e-6;
-  double tick = 50e-6;  ///< s
+  double tick = firmware::tick_interval;  ///< s
   double supply_min = 8.0, supply_max = 26.0;
   double temperature_limit = 100.0;
 

@@ -1,6 +1,7 @@
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
 
 #include "drivers/as5047p_frames.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 
 namespace kmax::simulated_board {
 
@@ -29,15 +30,15 @@ void SimulatedSerialEncoder::restart_without_turns() {
 }
 
 SimulatedPowerHardware::SimulatedPowerHardware(simulation::SceneDrives& drives)
-    : drives_(drives), supply_code_(converter_code(drives.supply().pin_voltage())) {
+    : drives_(drives), supply_code_(simulation::converter_code(drives.supply().pin_voltage())) {
   started_.fill(true);
 }
 
 const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::size_t axis) {
   simulation::MotorDrive& drive = drives_.drive(axis);
-  supply_code_ = converter_code(drives_.supply().pin_voltage());
-  samples_[axis].phase_b = converter_code(drive.current_pin(Channel::b));
-  samples_[axis].phase_c = converter_code(drive.current_pin(Channel::c));
+  supply_code_ = simulation::converter_code(drives_.supply().pin_voltage());
+  samples_[axis].phase_b = simulation::converter_code(drive.current_pin(Channel::b));
+  samples_[axis].phase_c = simulation::converter_code(drive.current_pin(Channel::c));
   samples_[axis].supply = supply_code_;
   return samples_[axis];
 }
@@ -45,8 +46,8 @@ const SimulatedPowerHardware::Sample& SimulatedPowerHardware::ISR_sample(std::si
 drivers::stm32f4::ZeroCurrentCodes SimulatedPowerHardware::zero_current(std::size_t axis) {
   constexpr auto half = simulation::CurrentSensor::Half::high_sides;
   simulation::MotorDrive& drive = drives_.drive(axis);
-  return {converter_code(drive.current_pin(Channel::b, half)),
-          converter_code(drive.current_pin(Channel::c, half))};
+  return {simulation::converter_code(drive.current_pin(Channel::b, half)),
+          simulation::converter_code(drive.current_pin(Channel::c, half))};
 }
 
 std::uint32_t SimulatedPowerHardware::ISR_counter(std::size_t axis) const {
@@ -65,7 +66,7 @@ void SimulatedPowerHardware::set_brake(bool on) {
 }
 
 std::uint16_t SimulatedPowerHardware::temperature_code(std::size_t axis) const {
-  return converter_code(drives_.temperature(axis).pin_voltage());
+  return simulation::converter_code(drives_.temperature(axis).pin_voltage());
 }
 
 bool SimulatedPowerHardware::supply_suffices() const {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "drivers/analog_converter.hpp"
+
 namespace kmax::simulation {
 
 CurrentSensor::CurrentSensor(const CurrentSensorConfig& config, std::uint64_t seed)
@@ -24,7 +26,7 @@ double CurrentSensor::sample(Channel channel, double shunt_current, Half half) {
   if (floating_) {
     double& drift = drift_[index];
     drift = std::clamp(drift + 0.02 * noise_[index].gaussian(), -0.8, 0.8);
-    return 0.5 * reference + drift + 0.05 * noise_[index].gaussian();
+    return 0.5 * drivers::converter_reference + drift + 0.05 * noise_[index].gaussian();
   }
   const bool b = channel == Channel::b;
   double input = shorted_[index] ? 0.0 : config_.shunt * shunt_current;
@@ -34,9 +36,10 @@ double CurrentSensor::sample(Channel channel, double shunt_current, Half half) {
   if (driven_) input += b ? config_.driven_b : config_.driven_c;
   const std::size_t stream = half == Half::low_sides ? index : index + 2;
   if (config_.noise > 0.0) input += config_.noise * noise_[stream].gaussian();
-  if (stuck_[index]) return std::clamp(*stuck_[index], 0.0, reference);
+  if (stuck_[index]) return std::clamp(*stuck_[index], 0.0, drivers::converter_reference);
   const double offset = b ? config_.offset_b : config_.offset_c;
-  return std::clamp(0.5 * reference + offset + config_.gain * input, 0.0, reference);
+  return std::clamp(0.5 * drivers::converter_reference + offset + config_.gain * input, 0.0,
+                    drivers::converter_reference);
 }
 
 double CurrentSensor::left_after(double seconds) const {

@@ -84,7 +84,6 @@ inline constexpr std::array current_sensor_fields{
 class CurrentSensor {
  public:
   enum class Channel : std::uint8_t { b, c };
-  static constexpr double reference = 3.3;  // V, of the converter and of the amplifiers
 
   // Throws std::invalid_argument.
   explicit CurrentSensor(const CurrentSensorConfig& config = {}, std::uint64_t seed = 1);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "drivers/analog_converter.hpp"
+
 namespace kmax::simulation {
 namespace {
 constexpr double smallest_exponent = 1e-9;  // rate x duration below which the voltage runs straight
@@ -43,7 +45,7 @@ void Supply::draw(double charge) {
 }
 
 double Supply::pin_voltage() const {
-  return std::min(voltage_ / config_.divider_ratio, reference);
+  return std::min(voltage_ / config_.divider_ratio, drivers::converter_reference);
 }
 
 double Supply::source_current() const {

@@ -51,8 +51,6 @@ inline constexpr std::array supply_fields{
 
 class Supply {
  public:
-  static constexpr double reference = 3.3;  // V, of the converter
-
   // Begins connected, the capacitor charged to E. Throws std::invalid_argument.
   explicit Supply(const SupplyConfig& config = {});
 

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "drivers/analog_converter.hpp"
 #include "drivers/ntc_thermistor.hpp"
 
 namespace kmax::simulation {
@@ -18,7 +19,6 @@ namespace kmax::simulation {
 class TemperatureSensor {
  public:
   enum class Wiring : std::uint8_t { intact, open, shorted };
-  static constexpr double reference = 3.3;  // V
 
   explicit TemperatureSensor(const drivers::NtcThermistorConfig& config) : config_(config) {}
 
@@ -34,10 +34,10 @@ class TemperatureSensor {
   // V. One exponential: for the rate at which temperatures are read.
   double pin_voltage() const {
     if (wiring_ == Wiring::open) return 0.0;
-    if (wiring_ == Wiring::shorted) return reference;
+    if (wiring_ == Wiring::shorted) return drivers::converter_reference;
     const double ratio = std::exp(config_.beta_kelvin * (1.0 / (celsius_ + 273.15) - 1.0 / 298.15));
     const double ground = config_.ground_resistor_ohm;
-    return reference * ground / (ground + config_.resistance_25_ohm * ratio);
+    return drivers::converter_reference * ground / (ground + config_.resistance_25_ohm * ratio);
   }
 
  private:

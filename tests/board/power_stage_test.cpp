@@ -9,6 +9,10 @@ namespace {
 
 using firmware::Fault;
 
+constexpr std::size_t another(std::size_t axis) {
+  return (axis + 1) % 2;
+}
+
 struct Hardware {
   bool gate = false, fault_low = false, stop_open = false;
   GateDriverAnswer answers[2] = {GateDriverAnswer::accepted, GateDriverAnswer::accepted};
@@ -76,7 +80,7 @@ TEST_F(PowerStageTest, ADriverThatPullsTheFaultLineIsNamedBesideOneThatDoesNotAn
     for (const std::size_t axis : {0U, 1U}) {
       Hardware board;
       PowerStage<Hardware> faulty{board};
-      board.answers[1 - axis] = other;
+      board.answers[another(axis)] = other;
       board.fault_low = board.names_cause[axis] = true;
       std::uint32_t at = 0;
       for (; at < 1'000'000; at += 100) faulty.poll(at, false);
@@ -85,7 +89,7 @@ TEST_F(PowerStageTest, ADriverThatPullsTheFaultLineIsNamedBesideOneThatDoesNotAn
       EXPECT_FALSE(board.missing[0] || board.missing[1]);
       board.fault_low = board.names_cause[axis] = false;
       for (; at < 2'000'000; at += 100) faulty.poll(at, false);
-      EXPECT_EQ(board.missing[1 - axis], other == GateDriverAnswer::silent);
+      EXPECT_EQ(board.missing[another(axis)], other == GateDriverAnswer::silent);
       EXPECT_EQ(faulty.condition(), other == GateDriverAnswer::silent ? Fault::none : Fault::power_stage);
     }
   }
@@ -155,7 +159,7 @@ TEST_F(PowerStageTest, AChipThatHasNeverAnsweredIsMissingAndTheOtherGoesOn) {
     }
     for (std::uint32_t at = 450'000; at < 500'000; at += 100) other.poll(at, false);
     EXPECT_TRUE(board.missing[axis]);
-    EXPECT_FALSE(board.missing[1 - axis]);
+    EXPECT_FALSE(board.missing[another(axis)]);
     EXPECT_TRUE(other.ready());
     EXPECT_EQ(other.condition(), Fault::none);
   }

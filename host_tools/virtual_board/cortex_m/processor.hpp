@@ -199,7 +199,8 @@ class Processor {
   void lock_up(const std::string& why);
   std::string place(std::uint32_t pc) const;
 
-  friend struct ProcessorHooks;
+  /// What the engine calls; it takes functions that are no members.
+  struct Hooks;
 
   Bus& bus_;
   CorePeripherals& core_;

@@ -27,7 +27,7 @@ constexpr const char* forbidden_words = "the memory protection forbids it";
 
 }  // namespace
 
-struct ProcessorHooks {
+struct Processor::Hooks {
   static void block(uc_engine* /*engine*/, std::uint64_t address, std::uint32_t size, void* self) {
     auto& processor = *static_cast<Processor*>(self);
     try {
@@ -82,11 +82,11 @@ void Processor::map_memory() {
   map(bus_.sram(), sram.base, UC_PROT_ALL);
   map(bus_.ccm(), ccm.base, UC_PROT_READ | UC_PROT_WRITE);
   map(bus_.sram().first(sram1.size), sram1_at_zero.base, UC_PROT_NONE);
-  ProcessorHooks::map_registers<parameters>(engine, this);
-  ProcessorHooks::map_registers<register_areas[0]>(engine, this);
-  ProcessorHooks::map_registers<register_areas[1]>(engine, this);
-  ProcessorHooks::map_registers<register_areas[2]>(engine, this);
-  ProcessorHooks::map_registers<register_areas[3]>(engine, this);
+  Hooks::map_registers<parameters>(engine, this);
+  Hooks::map_registers<register_areas[0]>(engine, this);
+  Hooks::map_registers<register_areas[1]>(engine, this);
+  Hooks::map_registers<register_areas[2]>(engine, this);
+  Hooks::map_registers<register_areas[3]>(engine, this);
   static_assert(register_areas.size() == 4);
 }
 
@@ -158,16 +158,16 @@ void Processor::add_hooks() {
     CoreEngine::check(
         uc_hook_add(engine_.handle(), &hook, type, reinterpret_cast<void*>(function), this, 1, 0), what);
   };
-  add(UC_HOOK_BLOCK, &ProcessorHooks::block, "hooking blocks");
-  add(UC_HOOK_INTR, &ProcessorHooks::interrupt, "hooking exceptions");
-  add(UC_HOOK_MEM_INVALID, &ProcessorHooks::invalid, "hooking invalid accesses");
+  add(UC_HOOK_BLOCK, &Hooks::block, "hooking blocks");
+  add(UC_HOOK_INTR, &Hooks::interrupt, "hooking exceptions");
+  add(UC_HOOK_MEM_INVALID, &Hooks::invalid, "hooking invalid accesses");
 }
 
 void Processor::on_data_access(std::function<void(std::uint32_t address)> callback) {
   on_data_access_ = std::move(callback);
   uc_hook hook{};
   CoreEngine::check(uc_hook_add(engine_.handle(), &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE,
-                                reinterpret_cast<void*>(&ProcessorHooks::access), this, 1, 0),
+                                reinterpret_cast<void*>(&Hooks::access), this, 1, 0),
                     "hooking accesses");
 }
 

@@ -1,6 +1,7 @@
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
 
 #include "board/odrive_v3/description.hpp"
+#include "drivers/analog_converter.hpp"
 
 namespace kmax::virtual_board {
 
@@ -55,7 +56,7 @@ void SceneWorld::set_brake(bool on, BoardTime now) {
 }
 
 double SceneWorld::current_pin(std::size_t axis, CurrentSensor::Channel channel) {
-  if (!drives_.has(axis)) return CurrentSensor::reference / 2.0;
+  if (!drives_.has(axis)) return drivers::converter_reference / 2.0;
   using enum CurrentSensor::Half;
   return drives_.drive(axis).current_pin(channel, axis == low_sides_of_ ? low_sides : high_sides);
 }

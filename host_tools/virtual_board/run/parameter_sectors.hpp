@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "drivers/stm32f4/flash_sectors.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/virtual_board/odrive_v3/virtual_board.hpp"
@@ -15,7 +16,7 @@ namespace kmax::virtual_board {
 class ParameterSectors {
  public:
   static constexpr std::size_t sector_count = 2;
-  static constexpr std::size_t words_per_sector = 4096;
+  static constexpr std::size_t words_per_sector = drivers::stm32f4::FlashSectors<>::words_per_sector;
 
   explicit ParameterSectors(Bus& bus);
 

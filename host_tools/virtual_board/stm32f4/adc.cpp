@@ -8,6 +8,7 @@
 
 #include "drivers/stm32f4/interrupts.hpp"
 #include "drivers/stm32f4/registers/adc.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 
 namespace kmax::virtual_board {
 
@@ -44,7 +45,7 @@ AdcModel::AdcModel(const BoardClocks& clocks, InterruptLines& interrupts, Input 
 
 std::uint32_t AdcModel::code_of(double volts) {
   if (std::isnan(volts)) throw RefusedAccess("ADC: the voltage to convert is not a number");
-  return static_cast<std::uint32_t>(std::clamp(std::floor(volts * (4096.0 / 3.3) + 0.5), 0.0, 4095.0));
+  return simulation::converter_code(volts);
 }
 
 const RegisterTable<AdcModel::Converter>& AdcModel::Converter::registers() {

@@ -222,17 +222,4 @@ TEST(SimulatedPowerHardware, TheCodesAtZeroCurrentAreTheOffsetsWhateverFlows) {
   EXPECT_NEAR(codes.phase_c, 2048 - 0.004 * 4096 / 3.3, 2.5);
 }
 
-TEST(ConverterCode, IsTheNearestCodeWithinTheRange) {
-  EXPECT_EQ(converter_code(0.0), 0);
-  EXPECT_EQ(converter_code(1.65), 2048);
-  constexpr double step = 3.3 / 4096.0;
-  EXPECT_EQ(converter_code(100.49 * step), 100);
-  EXPECT_EQ(converter_code(100.51 * step), 101);
-  EXPECT_EQ(converter_code(3.3), 4095);
-  EXPECT_EQ(converter_code(5.0), 4095);
-  EXPECT_EQ(converter_code(-1.0), 0);
-  EXPECT_EQ(converter_code(std::numeric_limits<double>::infinity()), 4095);
-  EXPECT_THROW(converter_code(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
-}
-
 }  // namespace kmax::simulated_board::simulated_power_hardware_test

@@ -8,6 +8,7 @@
 #include "firmware/drive/axis.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 #include "tests/host_tools/simulated_board/torque_ripple.hpp"
 
 namespace kmax::simulated_board::spin_out_test {
@@ -80,7 +81,8 @@ class SpinOut {
     simulation::Supply supply = scene_.make_supply();
     drive.current_sensor().set_gain(40.0);
     const auto pin = [&](simulation::CurrentSensor::Channel channel) {
-      return converter_code(drive.current_pin(channel)) * 3.3 / 4096.0;
+      return simulation::converter_code(drive.current_pin(channel)) * drivers::converter_reference /
+             drivers::converter_codes;
     };
     using Channel = simulation::CurrentSensor::Channel;
     double zero_b = 0.0, zero_c = 0.0;

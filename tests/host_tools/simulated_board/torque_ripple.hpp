@@ -23,6 +23,7 @@
 
 #include "firmware/drive/axis.hpp"
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 #include "host_tools/simulation/scene.hpp"
 
 namespace kmax::torque_ripple {
@@ -244,7 +245,7 @@ class Rig {
     const double current =
         std::visit([](const auto& motor) { return motor.currents(); }, motor_)[channel + 1];
     const double volt = sensor_.sample(static_cast<simulation::CurrentSensor::Channel>(channel), current);
-    return simulated_board::converter_code(volt) * 3.3 / 4096.0;
+    return simulation::converter_code(volt) * drivers::converter_reference / drivers::converter_codes;
   }
   float amperes(std::size_t channel) {
     return static_cast<float>((pin(channel) - zero_[channel]) / (sensor_.gain() * sensor_.config().shunt));

@@ -278,7 +278,7 @@ std::string words_for(Refusal refusal) {
 class Cell {
  public:
   Cell(Bench& bench, const Cause& cause, DriveState state, std::size_t axis)
-      : bench_(bench), cause_(cause), state_(state), axis_(axis), other_(1 - axis) {}
+      : bench_(bench), cause_(cause), state_(state), axis_(axis), other_((axis + 1) % axes) {}
 
   std::string measure() {
     std::string text;

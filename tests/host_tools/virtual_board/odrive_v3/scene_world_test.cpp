@@ -1,6 +1,7 @@
 // The scene on the virtual board's connectors, and the same scene on the native board: one physical world,
 // sampled and driven at the same instants, gives the same codes.
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 
 #include <gtest/gtest.h>
 
@@ -49,7 +50,7 @@ class OnWorld {
   void sample(Record& record) {
     for (const unsigned channel :
          {unsigned{wiring.axes[0].b}, unsigned{wiring.axes[0].c}, unsigned{wiring.supply}})
-      record.codes.push_back(simulated_board::converter_code(world.analogue(channel, now_)));
+      record.codes.push_back(simulation::converter_code(world.analogue(channel, now_)));
     record.codes.push_back(static_cast<std::uint32_t>(world.encoder(0, now_).edges));
     record.codes.push_back(static_cast<std::uint32_t>(world.serial_encoder(now_).angle));
   }
@@ -72,7 +73,7 @@ class OnDrives {
   void tick(const simulated_board::SimulatedBridge& before, const simulated_board::SimulatedBridge& after,
             Record& record) {
     using Channel = simulation::CurrentSensor::Channel;
-    using simulated_board::converter_code;
+    using simulation::converter_code;
     record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::b)));
     record.codes.push_back(converter_code(drives.drive(0).current_pin(Channel::c)));
     record.codes.push_back(converter_code(drives.supply().pin_voltage()));
