@@ -94,7 +94,7 @@ TEST(CompareWithAudit, HasEveryLawAndItsNoiseAndEveryReading) {
   run.steps.last = 1500.0;
   std::vector<BaselineResult> results;
   for (const Baseline& law : law_baselines())
-    results.push_back({law, only(3000.0), only(1.0), only(2000.0), only(2000.0), {}});
+    results.push_back({law, only(3000.0), only(1.0), only(2000.0), only(2000.0), {}, {}});
   const AuditComparison comparison = compare_with_audit(few_people(1), results, results, run);
   ASSERT_EQ(comparison.rows.size(), audited_laws.size());
   for (const AuditRow& row : comparison.rows) {

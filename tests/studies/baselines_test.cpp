@@ -48,6 +48,10 @@ TEST(Baselines, DampingAllowsMoreThanThePlainWallAndCostsNoField) {
     for (std::size_t n = 0; n < 3; ++n)
       sum += std::min(result.moves.people[n].stiffness, result.feels.people[n].stiffness);
     EXPECT_DOUBLE_EQ(result.both.mean, sum / 3.0);
+    for (std::size_t n = 0; n < 3; ++n) {
+      // A smaller swing that counts ends the search no later.
+      EXPECT_LE(result.notices.people[n].stiffness, result.feels.people[n].stiffness);
+    }
     EXPECT_GT(result.price.peak_force, 2.0);
     EXPECT_LE(result.price.peak_force, 3.3 + 1e-6);
   }
@@ -127,7 +131,8 @@ TEST(PassivityController, BeginsEachTouchWithoutAMemory) {
 std::vector<BaselineResult> made_up(const std::vector<Baseline>& laws, const WallPrice& price) {
   std::vector<BaselineResult> results;
   for (const Baseline& law : laws)
-    results.push_back({law, mean_of(4000.0), mean_of(3900.0), mean_of(4000.0), mean_of(3800.0), price});
+    results.push_back(
+        {law, mean_of(4000.0), mean_of(3900.0), mean_of(4000.0), mean_of(3800.0), mean_of(3000.0), price});
   return results;
 }
 
@@ -152,6 +157,36 @@ TEST(BaselineSection, TheFrontAndTheRatingsFollowTheNumbers) {
   EXPECT_CONTAINS(said, "field of 2 N, moves: 1 of 2");
   results[1].price.field_at_rest = 0.5;
   EXPECT_CONTAINS(paragraphs_of(baseline_section(two_people(), results)), "field at rest rises: no");
+}
+
+TEST(NoticedSection, SaysWhatIsLeftByWhatPeopleNotice) {
+  std::vector<BaselineResult> results = made_up(law_baselines(), {});
+  results[6].notices = mean_of(7500.0);
+  SubjectSet set = two_people();
+  set.device.force_limit = 3.0;
+  NoticedWalls finer{{"plain", mean_of(4000.0)}, {results[6].law.name, mean_of(20000.0)}};
+  const report::Section section = noticed_section(set, results, finer);
+  EXPECT_EQ(section.tables[0].rows[0], (Row{"plain", "4.00", "4.00", "3.00", "4.00"}));
+  EXPECT_EQ(section.tables[0].rows[1].back(), "-");
+  const std::string said = paragraphs_of(section);
+  EXPECT_CONTAINS(said, "0.21 N is that of 3 N");
+  EXPECT_CONTAINS(said, "counts of 55 um swings by 0.21 N from 3.82 N/mm on");
+  EXPECT_CONTAINS(said,
+                  "7.50 the most of these walls, " + results[6].law.name + ": 2.5 times the plain wall");
+  EXPECT_CONTAINS(said, "at 38.18 N/mm, " + results[6].law.name + " holds 20.00, 5.0 times the plain wall");
+  EXPECT_NO_THROW(report::require_rectangular(section.tables[0]));
+  set.device.force_limit = 0.0;
+  EXPECT_NEAR(noticed_force(set), 0.07 * 3.3, 1e-12);
+  results[0].notices = mean_of(0.0);
+  EXPECT_CONTAINS(paragraphs_of(noticed_section(set, results, finer)), "where the plain wall holds none");
+}
+
+TEST(Baselines, AFinerEncoderFlickersLater) {
+  const SubjectSet people = few_people(1);
+  const NoticedWalls finer = run_noticed_with_finer_encoder(people, quick_run());
+  const auto coarse = run_baselines(people, {plain_wall()}, quick_run());
+  EXPECT_GE(finer.front().second.mean, coarse.front().notices.mean);
+  EXPECT_GT(finer.back().second.mean, finer.front().second.mean);
 }
 
 TEST(PriceFront, HasEveryWallOnceInEachPanel) {

@@ -311,10 +311,16 @@ std::vector<Baseline> relation_baselines();
 using WallPrice = experiment::TouchPrice;
 WallPrice price_of(const SubjectSet& set, const WallChange& wall, double stiffness);
 
+/// The share of a force by which another must differ to be noticed: 7 % in matching forces of the arm (Jones
+/// 1989, Perception 18, 681 to 687), 5 to 10 % and 7 % in the mean in pinching at 2.5 to 10 N (Pang, Tan and
+/// Durlach 1991, Perception and Psychophysics 49, 531 to 540).
+inline constexpr double noticed_share = 0.07;
+
 struct BaselineResult {
   Baseline law;
   PeopleMean moves, phases, feels;  ///< by the position, the same with four phases, by the force
   PeopleMean both;                  ///< of each of the people the smaller by position and force
+  PeopleMean notices;               ///< by a force that swings by noticed_force()
   WallPrice price;
 };
 std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vector<Baseline>& laws,
@@ -322,6 +328,14 @@ std::vector<BaselineResult> run_baselines(const SubjectSet& set, const std::vect
 /// Largest stiffness by both criteria against what each wall costs, a curve a family.
 plot::Figure price_front(const SubjectSet& set, const std::vector<BaselineResult>& results);
 report::Section baseline_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
+/// N peak to peak: noticed_share of the device's largest force; of one that never clips, of the papers'.
+double noticed_force(const SubjectSet& set);
+/// Some of them with an encoder ten times finer, by what people notice: name and result.
+using NoticedWalls = std::vector<std::pair<std::string, PeopleMean>>;
+NoticedWalls run_noticed_with_finer_encoder(const SubjectSet& set, const StiffnessRun& run);
+/// The walls by what people notice, whatever our own threshold is.
+report::Section noticed_section(const SubjectSet& set, const std::vector<BaselineResult>& results,
+                                const NoticedWalls& finer);
 report::Section relation_section(const SubjectSet& set, const std::vector<BaselineResult>& results);
 
 // --- Stiffness against damping (damping_map.cpp) ----------------------------------------------------------
