@@ -193,7 +193,9 @@ NoticedWalls run_noticed_with_finer_encoder(const SubjectSet& set, const Stiffne
       setup.wall.count_length = finer_count;
     });
   }
-  const std::vector<PeopleMean> found = sweep(set, changes, {noticing(set, run)}, run).front();
+  StiffnessRun wide = run;
+  wide.steps.growth = 0.03;
+  const std::vector<PeopleMean> found = sweep(set, changes, {noticing(set, wide)}, wide).front();
   for (std::size_t n = 0; n < walls.size(); ++n) walls[n].second = found[n];
   return walls;
 }
@@ -406,13 +408,15 @@ report::Section noticed_section(const SubjectSet& set, const std::vector<Baselin
           "vibration in the skin's best range is felt far below, so that a wall that passes here may "
           "still buzz.",
           noticed_share * 100.0, band, band / noticed_share),
-      fmt::format("A flicker between two counts of {:g} um swings by {:.3g} N from {} N/mm on. So judged the "
-                  "plain wall holds {} N/mm, and {} the most of these walls, {}: {}. With counts of {:g} um, "
-                  "where that begins at {} N/mm, {} holds {}, {}.",
-                  count * 1e6, band, flickers(count), n_per_mm(results.front().notices.mean),
-                  n_per_mm(most.notices.mean), most.law.name, times(most.notices, results.front().notices),
-                  finer_count * 1e6, flickers(finer_count), most_finer.first,
-                  n_per_mm(most_finer.second.mean), times(most_finer.second, finer.front().second))};
+      fmt::format(
+          "A flicker between two counts of {:g} um swings by {:.3g} N from {} N/mm on. So judged the "
+          "plain wall holds {} N/mm, and {} the most of these walls, {}: {}. With counts of {:g} um, "
+          "where that begins at {} N/mm, {} holds {}, {}.",
+          count * 1e6, band, flickers(count), n_per_mm(results.front().notices.mean),
+          n_per_mm(most.notices.mean), most.law.name, times(most.notices, results.front().notices),
+          finer_count * 1e6, flickers(finer_count), most_finer.first,
+          (most_finer.second.ends.beyond_last > 0 ? "more than " : "") + n_per_mm(most_finer.second.mean),
+          times(most_finer.second, finer.front().second))};
   section.tables.push_back(std::move(table));
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));
   return section;
