@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/base/axis_name.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/suggestion.hpp"
 
@@ -17,18 +18,14 @@ struct SplitName {
   std::string_view rest;
 };
 
-/// Takes an axis prefix off: "axis" and digits before the first dot.
+/// All numbers that no axis has are axis_count.
 SplitName split(std::string_view name) {
-  constexpr std::string_view prefix = "axis";
-  const auto dot = name.find('.');
-  if (dot == std::string_view::npos || !name.starts_with(prefix)) return {std::nullopt, name};
-  const std::string_view digits = name.substr(prefix.size(), dot - prefix.size());
-  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos)
-    return {std::nullopt, name};
+  const auto [word, rest] = base::split_axis(name);
+  if (word.empty()) return {std::nullopt, name};
   std::size_t axis = 0;
-  for (const char digit : digits)
+  for (const char digit : word.substr(4))
     axis = std::min(axis_count, axis * 10 + static_cast<std::size_t>(digit - '0'));
-  return {axis, name.substr(dot + 1)};
+  return {axis, rest};
 }
 
 const std::vector<std::string>& dictionary_names() {

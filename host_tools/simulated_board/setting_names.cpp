@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/base/axis_name.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/base/suggestion.hpp"
@@ -17,14 +18,6 @@ using simulation::SceneKey;
 using simulation::SceneValue;
 
 constexpr std::string_view parameters_prefix = "parameters.";
-
-/// "axis1." of "axis1.device.mass"; axis 0 is not named in a scene.
-std::string_view axis_prefix(std::string_view name) {
-  const std::size_t dot = name.find('.');
-  const bool axis = name.starts_with("axis") && dot != std::string_view::npos && dot > 4 &&
-                    name.substr(4, dot - 4).find_first_not_of("0123456789") == std::string_view::npos;
-  return axis ? name.substr(0, dot + 1) : std::string_view();
-}
 
 const SceneKey* scene_key(std::string_view name, bool on_axis) {
   const std::size_t dot = name.find('.');
@@ -42,22 +35,20 @@ NamedSetting parameter_setting(std::string_view name) {
 
 bool is_parameter(std::string_view name) {
   const auto& all = device::all_parameters();
-  const std::string_view bare = name.starts_with("axis0.") ? name.substr(6) : name;
+  const std::string_view bare = base::without_axis_0(name);
   return std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.name() == bare; });
 }
 }  // namespace
 
 NamedSetting resolve_setting(std::string_view name) {
   if (name.starts_with(parameters_prefix)) return parameter_setting(name.substr(parameters_prefix.size()));
-  const std::string_view axis = axis_prefix(name);
-  const std::string_view bare = name.substr(axis.size());
-  if (const SceneKey* key = scene_key(bare, !axis.empty())) {
-    const std::string prefix = axis == "axis0." ? "" : std::string(axis);
-    return {prefix + std::string(bare), key->unit, key->type == SceneValue::number};
-  }
+  const auto [axis, bare] = base::split_axis(name);
+  if (const SceneKey* key = scene_key(bare, !axis.empty()))
+    return {std::string(base::without_axis_0(name)), key->unit, key->type == SceneValue::number};
   if (is_parameter(name)) return parameter_setting(name);
   std::vector<std::string> known;
-  for (const SceneKey& key : simulation::scene_keys()) known.push_back(std::string(axis) + key.full());
+  for (const SceneKey& key : simulation::scene_keys())
+    known.push_back((axis.empty() ? "" : std::string(axis) + ".") + key.full());
   for (const device::Parameter& parameter : device::all_parameters()) {
     if (std::find(known.begin(), known.end(), parameter.name()) == known.end())
       known.push_back(parameter.name());

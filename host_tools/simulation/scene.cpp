@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "firmware/object_dictionary/entry.hpp"
+#include "host_tools/base/axis_name.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/numbers.hpp"
@@ -378,7 +379,7 @@ class SceneReader : private SceneTables {
   static const SceneParameter* find_parameter(const Scene& scene, const std::string& prefix,
                                               std::string_view name) {
     for (const SceneParameter& parameter : scene.parameters) {
-      if (without_axis_0(parameter.name) == prefix + std::string(name)) return &parameter;
+      if (base::without_axis_0(parameter.name) == prefix + std::string(name)) return &parameter;
     }
     return nullptr;
   }
@@ -435,7 +436,7 @@ class SceneReader : private SceneTables {
                                         text_of(node)));
       }
       for (const SceneParameter& earlier : scene.parameters) {
-        if (without_axis_0(earlier.name) == without_axis_0(name)) {
+        if (base::without_axis_0(earlier.name) == base::without_axis_0(name)) {
           fail(node.source(),
                fmt::format("parameters.{} = {}: given twice (also at {}{}); remove one", name, text_of(node),
                            earlier.where, earlier.name == name ? "" : ", as " + earlier.name));

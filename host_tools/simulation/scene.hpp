@@ -52,12 +52,6 @@ struct Measurement {
 
 using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 
-/// Axis 0 need not be named: `axis0.wall.position` and `wall.position` are one parameter.
-constexpr std::string_view without_axis_0(std::string_view name) {
-  constexpr std::string_view axis = "axis0.";
-  return name.starts_with(axis) ? name.substr(axis.size()) : name;
-}
-
 struct SceneParameter {
   std::string name;
   ParameterValue value;

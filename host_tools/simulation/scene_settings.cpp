@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/base/axis_name.hpp"
 #include "host_tools/base/numbers.hpp"
 #include "host_tools/simulation/scene_keys.hpp"
 
@@ -17,13 +18,10 @@ constexpr std::string_view parameters_name = "parameters";
 
 // "axis1" of "axis1.device.mass", which then is the rest.
 std::optional<std::string> take_axis(std::string_view& name) {
-  const std::size_t dot = name.find('.');
-  if (!name.starts_with("axis") || dot == std::string_view::npos || dot <= 4) return std::nullopt;
-  if (name.substr(4, dot - 4).find_first_not_of("0123456789") != std::string_view::npos) return std::nullopt;
-  const std::string axis(name.substr(0, dot));
-  name.remove_prefix(dot + 1);
-  if (axis == "axis0") return std::nullopt;
-  return axis;
+  const auto [axis, rest] = base::split_axis(name);
+  name = rest;
+  if (axis.empty() || axis == "axis0") return std::nullopt;
+  return std::string(axis);
 }
 
 // However its name is spread over tables in the file.
@@ -33,7 +31,7 @@ void erase_parameter(toml::table& table, const std::string& prefix, std::string_
     const std::string full = prefix + std::string(key.str());
     if (toml::table* inner = node.as_table()) {
       erase_parameter(*inner, full + ".", name);
-    } else if (without_axis_0(full) == without_axis_0(name)) {
+    } else if (base::without_axis_0(full) == base::without_axis_0(name)) {
       erased.emplace_back(key.str());
     }
   }
