@@ -62,10 +62,10 @@ struct HandleModel {
 
 /// What a time does to the state: state(t) = state(0) + change state(0) + input u, u constant. `change` is
 /// the transition matrix less the unit matrix: with fast sampling it is small, and would be lost beside
-/// the 1.
-template <typename Scalar>
+/// the 1. `Mechanics`: what moves, with the members of a HandleModel; its force acts on the second state.
+template <typename Scalar, typename Mechanics = HandleModel<Scalar>>
 struct HandleTransition {
-  using Model = HandleModel<Scalar>;
+  using Model = Mechanics;
   typename Model::Matrix change{};
   typename Model::Vector input{};
 

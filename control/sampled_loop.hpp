@@ -27,11 +27,10 @@ struct SampledLoop {
 /// The longest delay, in samples.
 inline constexpr int longest_delay = 8;
 
-/// A polynomial, [i] of the i-th power.
-inline constexpr std::size_t loop_polynomial_size = 2 + HandleModel<double>::largest_order + longest_delay;
-template <typename Scalar>
+/// A polynomial, [i] of the i-th power, of a loop whose mechanics have up to `order` states.
+template <typename Scalar, std::size_t order = HandleModel<Scalar>::largest_order>
 struct LoopPolynomial {
-  std::array<Scalar, loop_polynomial_size> coefficient{};
+  std::array<Scalar, 2 + order + longest_delay> coefficient{};
   std::size_t degree = 0;
 
   /// Times a0 + a1 s.
@@ -56,15 +55,23 @@ struct LoopPolynomial {
 /// recursion); d: whole samples of delay; f = 1 if a part of a sample is left of it, else 0; g = 1 with wall
 /// damping, else 0. Polynomials are in z - 1: all eigenvalues crowd at z = 1 when sampling is fast, and in
 /// powers of z what tells them apart would be lost to rounding.
-template <typename Scalar>
+///
+/// `Mechanics`: what the wall pushes, with the members of a HandleModel: a state whose first number is the
+/// position that is sampled and whose second is the velocity of the mass that the force acts on.
+template <typename Scalar, typename Mechanics = HandleModel<Scalar>>
 class LoopEquation {
  public:
-  using Model = HandleModel<Scalar>;
+  using Model = Mechanics;
+  using Polynomial = LoopPolynomial<Scalar, Model::largest_order>;
 
   constexpr explicit LoopEquation(const SampledLoop<Scalar>& loop)
-      : order_(0), beta_(loop.wall_damping * (loop.period / loop.mass)), damped_(beta_ != Scalar(0)) {
-    const Model model(loop.mass, loop.damping, loop.period, loop.hand);
-    order_ = model.order;
+      : LoopEquation(loop, Model(loop.mass, loop.damping, loop.period, loop.hand)) {}
+
+  /// `model`: of the same mass (the unit of force is m/T^2), damping, period and hand.
+  constexpr LoopEquation(const SampledLoop<Scalar>& loop, const Model& model)
+      : order_(model.order),
+        beta_(loop.wall_damping * (loop.period / loop.mass)),
+        damped_(beta_ != Scalar(0)) {
     Scalar late = loop.delay / loop.period;
     while (late >= Scalar(1) && whole_delay_ < longest_delay) {
       late -= Scalar(1);
@@ -73,11 +80,11 @@ class LoopEquation {
     if (whole_delay_ == longest_delay) late = Scalar(0);
     split_ = late > Scalar(0);
 
-    HandleTransition<Scalar> sample(model, split_ ? late : Scalar(1));
+    HandleTransition<Scalar, Model> sample(model, split_ ? late : Scalar(1));
     typename Model::Vector newer = sample.input, older{};
     if (split_) {
-      const HandleTransition<Scalar> after(model, Scalar(1) - late);
-      older = HandleTransition<Scalar>::product(after.change, sample.input, order_);
+      const HandleTransition<Scalar, Model> after(model, Scalar(1) - late);
+      older = HandleTransition<Scalar, Model>::product(after.change, sample.input, order_);
       for (std::size_t i = 0; i < order_; ++i) older[i] += sample.input[i];
       newer = after.input;
       sample.append(after, order_);
@@ -96,13 +103,13 @@ class LoopEquation {
   }
 
   /// P, with the unit circle mapped on the left half plane: z = (1 + s)/(1 - s), times (1 - s)^degree.
-  constexpr LoopPolynomial<Scalar> half_plane_polynomial(Scalar kappa) const {
-    LoopPolynomial<Scalar> result = mapped(free_, order_);
+  constexpr Polynomial half_plane_polynomial(Scalar kappa) const {
+    Polynomial result = mapped(free_, order_);
     for (int i = 0; i < whole_delay_ + (split_ ? 1 : 0) + (damped_ ? 1 : 0); ++i)
       result.multiply(Scalar(1), Scalar(1));
-    LoopPolynomial<Scalar> feedback = mapped(answer_, order_ - 1);
+    Polynomial feedback = mapped(answer_, order_ - 1);
     if (split_) {
-      LoopPolynomial<Scalar> older = mapped(older_answer_, order_ - 1);
+      Polynomial older = mapped(older_answer_, order_ - 1);
       older.multiply(Scalar(1), Scalar(-1));
       feedback.multiply(Scalar(1), Scalar(1));
       feedback.add(older, Scalar(1));
@@ -164,8 +171,8 @@ class LoopEquation {
   }
 
   // sum c_i (2 s)^i (1 - s)^(degree - i)
-  static constexpr LoopPolynomial<Scalar> mapped(const Coefficients& c, std::size_t degree) {
-    LoopPolynomial<Scalar> sum, power;
+  static constexpr Polynomial mapped(const Coefficients& c, std::size_t degree) {
+    Polynomial sum, power;
     sum.coefficient[0] = c[0];
     power.coefficient[0] = Scalar(1);
     for (std::size_t i = 1; i <= degree; ++i) {
@@ -186,7 +193,7 @@ class LoopEquation {
         answer_[order_ - k] += m[0][j] * newer[j];
         older_answer_[order_ - k] += m[0][j] * older[j];
       }
-      m = HandleTransition<Scalar>::product(change, m, order_);
+      m = HandleTransition<Scalar, Model>::product(change, m, order_);
       Scalar trace = 0;
       for (std::size_t i = 0; i < order_; ++i) trace += m[i][i];
       const Scalar c = trace / -static_cast<Scalar>(k);

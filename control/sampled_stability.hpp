@@ -8,23 +8,28 @@
 
 namespace kmax::control {
 
-/// True if the loop is one that can be judged: mass and period > 0, delay of 0 to 8 periods, all finite and
-/// none negative but the wall's damping, and nothing in it so fast that the sample's transition overflows.
+/// True if each number of the loop is allowed: mass and period > 0, delay of 0 to 8 periods, none negative
+/// but the wall's damping.
 template <typename Scalar>
-constexpr bool can_be_judged(const SampledLoop<Scalar>& loop) {
+constexpr bool is_allowed(const SampledLoop<Scalar>& loop) {
   const Hand<Scalar>& h = loop.hand;
   if (!(loop.mass > Scalar(0) && loop.period > Scalar(0) && loop.damping >= Scalar(0))) return false;
   if (!(loop.delay >= Scalar(0) && loop.delay / loop.period <= Scalar(longest_delay))) return false;
-  if (!(h.hand_mass >= Scalar(0) && h.grip_stiffness >= Scalar(0) && h.grip_damping >= Scalar(0) &&
-        h.arm_stiffness >= Scalar(0) && h.arm_damping >= Scalar(0)))
-    return false;
-  return LoopEquation<Scalar>(loop).finite();
+  return h.hand_mass >= Scalar(0) && h.grip_stiffness >= Scalar(0) && h.grip_damping >= Scalar(0) &&
+         h.arm_stiffness >= Scalar(0) && h.arm_damping >= Scalar(0);
+}
+
+/// True if the loop is one that can be judged: allowed, all finite, and nothing in it so fast that the
+/// sample's transition overflows.
+template <typename Scalar>
+constexpr bool can_be_judged(const SampledLoop<Scalar>& loop) {
+  return is_allowed(loop) && LoopEquation<Scalar>(loop).finite();
 }
 
 /// Routh's test: true if all zeros of the polynomial lie in the left half plane. A zero on the axis, as far
 /// as rounding tells, is not.
-template <typename Scalar>
-constexpr bool all_in_left_half_plane(LoopPolynomial<Scalar> p) {
+template <typename Scalar, std::size_t order>
+constexpr bool all_in_left_half_plane(LoopPolynomial<Scalar, order> p) {
   auto& c = p.coefficient;
   const Scalar sign = c[p.degree] < Scalar(0) ? Scalar(-1) : Scalar(1);
   for (std::size_t i = 0; i <= p.degree; ++i) {
@@ -83,11 +88,11 @@ constexpr bool is_stable(const SampledLoop<Scalar>& loop, Scalar stiffness) {
 template <typename Scalar>
 constexpr Scalar largest_stable_stiffness(const SampledLoop<Scalar>& loop);
 
-/// The search itself, in gains kappa = K T^2/m.
-template <typename Scalar>
+/// The search itself, in gains kappa = K T^2/m. `Equation`: a LoopEquation.
+template <typename Scalar, typename Equation = LoopEquation<Scalar>>
 class StabilitySearch {
  public:
-  constexpr explicit StabilitySearch(const LoopEquation<Scalar>& equation) : equation_(equation) {}
+  constexpr explicit StabilitySearch(const Equation& equation) : equation_(equation) {}
 
   constexpr Scalar largest_stable_gain() {
     walk();
@@ -186,7 +191,7 @@ class StabilitySearch {
     note(last.gain);
   }
 
-  const LoopEquation<Scalar>& equation_;
+  const Equation& equation_;
   Scalar lowest_ = std::numeric_limits<Scalar>::max();
 };
 

@@ -14,6 +14,17 @@ constexpr SampledLoop<Scalar> sampled_loop_of(const StabilityCase<Scalar>& c) {
   return {c.mass, c.damping, c.wall_damping, c.period, c.delay, c.hand};
 }
 
+/// The sampled eigenvalues of `loop`, for which can_be_judged() and largest_stable_stiffness() are there.
+template <typename Scalar, typename Loop>
+constexpr CriterionResult<Scalar> judge_sampled_eigenvalues(const StabilityCase<Scalar>& c,
+                                                            const Loop& loop) {
+  constexpr Criterion criterion = Criterion::sampled_eigenvalues;
+  const bool wall = !(c.stiffness <= Scalar(0)) || c.wall_damping != Scalar(0);
+  if (!wall || !can_be_judged(loop)) return {criterion, false, true, false, Scalar(0), Scalar(0)};
+  const Scalar bound = largest_stable_stiffness(loop);
+  return {criterion, true, c.stiffness < bound, false, c.stiffness, bound};
+}
+
 /// One criterion for one case: those of closed_form_criteria.hpp, and
 ///
 ///   criterion            value   bound                                                    passes
@@ -26,11 +37,7 @@ constexpr SampledLoop<Scalar> sampled_loop_of(const StabilityCase<Scalar>& c) {
 template <typename Scalar>
 constexpr CriterionResult<Scalar> judge(Criterion criterion, const StabilityCase<Scalar>& c) {
   if (criterion != Criterion::sampled_eigenvalues) return judge_closed_form(criterion, c);
-  const SampledLoop<Scalar> loop = sampled_loop_of(c);
-  const bool wall = !(c.stiffness <= Scalar(0)) || c.wall_damping != Scalar(0);
-  if (!wall || !can_be_judged(loop)) return {criterion, false, true, false, Scalar(0), Scalar(0)};
-  const Scalar bound = largest_stable_stiffness(loop);
-  return {criterion, true, c.stiffness < bound, false, c.stiffness, bound};
+  return judge_sampled_eigenvalues(c, sampled_loop_of(c));
 }
 
 /// All of them, in the order of their numbers.

@@ -30,7 +30,11 @@ namespace kmax::control {
 ///
 /// Does not hold as a limit of stability: with friction or a hand, walls many times stiffer are stable
 /// (sampled_stability.hpp, diolaiti_criterion.hpp). Nor is it sufficient with coarse quantization
-/// (Abbott and Okamura, below) or an elastic structure.
+/// (Abbott and Okamura, below).
+///
+/// With an elastic structure between motor and hand it stays sufficient, if the position is measured on the
+/// motor's side and b is the damping of that side alone: structure, tip and hand are then together what holds
+/// the mass m, and passive, and m itself does not appear. An encoder beyond the structure is not covered.
 ///
 /// Returns the K that must not be reached, N/m: (b - |B|)/(T/2 + Td), negative if |B| > b; the largest number
 /// if T and Td are 0.

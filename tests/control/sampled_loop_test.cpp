@@ -51,7 +51,7 @@ TEST(LoopEquation, DegreeCountsTheStates) {
   EXPECT_EQ(degree(7.5e-3, 0.1, hand), 13u);
   EXPECT_EQ(degree(8e-3, 0.1, hand), 13u);
   EXPECT_EQ(degree(8.5e-3, 0.1, hand), 13u);  // beyond the longest delay: the longest
-  EXPECT_LT(13u, loop_polynomial_size);
+  EXPECT_LT(13u, LoopPolynomial<double>().coefficient.size());
 }
 
 // m x'' = -K x_k, nothing else: z^2 - (2 - kappa/2) z + 1 + kappa/2 = 0.
