@@ -1,26 +1,21 @@
-// The exact criterion of control/sampled_stability.hpp against a simulation that knows nothing of it: the
-// force of a linear wall is computed from the handle's position at each sample, in double, and CoupledHandle
-// moves under it. No friction, no quantization, no force limit. Just below the criterion's bound the motion
-// must die away, just above it must grow. Delay is made here, by dividing each sample where the delayed force
-// changes; one test uses the simulated device's own delay instead.
+// The exact criterion of control/sampled_stability.hpp against a simulation that knows nothing of it
+// (fate_at_wall.hpp). No friction, no quantization, no force limit. Just below the criterion's bound the
+// motion must die away, just above it must grow. One test uses the simulated device's own delay.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "control/diolaiti_criterion.hpp"
 #include "control/sampled_stability.hpp"
-#include "host_tools/simulation/coupled_handle.hpp"
 #include "tests/control/drawn_loop.hpp"
 #include "tests/control/step_matrix.hpp"
+#include "tests/host_tools/simulation/fate_at_wall.hpp"
 
 namespace kmax::simulation::sampled_stability_against_simulation_test {
 
 using Loop = control::SampledLoop<double>;
-
-enum class Delay { divided_sample, of_the_device };
 
 CoupledHandle handle_of(const Loop& loop, Delay delay) {
   const DeviceModel device{.mass = loop.mass,
@@ -39,47 +34,9 @@ CoupledHandle handle_of(const Loop& loop, Delay delay) {
   return CoupledHandle(device, person, IntendedMotionConfig{.start_position = 0.0}, start);
 }
 
-// Loops whose motion changes more slowly than this are not simulated, samples per factor e.
-constexpr double longest_e_fold = 60'000.0;
-
-enum class Fate { decays, grows, undecided };
-
-// Runs until the largest excursion of a block of samples is a twentieth, or the twentyfold, of the first
-// block's.
 Fate fate_of(const Loop& loop, double stiffness, double samples_per_e_fold,
              Delay delay = Delay::divided_sample) {
-  CoupledHandle handle = handle_of(loop, delay);
-  const int whole = static_cast<int>(std::floor(loop.delay / loop.period));
-  const double late = loop.delay - whole * loop.period;
-  // A ring; its size is a power of two, so that the index may wrap below 0.
-  std::array<double, 16> under_way{};
-  std::size_t newest = 0;
-  const auto force_of = [&](int samples_ago) {
-    return under_way[(newest - static_cast<std::size_t>(samples_ago)) % under_way.size()];
-  };
-  double last = handle.position();
-  const auto sample = [&] {
-    const double x = handle.position();
-    under_way[++newest % under_way.size()] = -stiffness * x - loop.wall_damping * (x - last) / loop.period;
-    last = x;
-    if (delay == Delay::of_the_device) {
-      handle.advance(force_of(0), 0.0, loop.period);
-      return std::abs(x);
-    }
-    if (late > 0.0) handle.advance(force_of(whole + 1), 0.0, late);
-    handle.advance(force_of(whole), 0.0, loop.period - late);
-    return std::abs(x);
-  };
-  const int block = std::max(30, static_cast<int>(samples_per_e_fold * 0.2));
-  double first = 0.0;
-  for (int blocks = 0; blocks < 400; ++blocks) {
-    double largest = 0.0;
-    for (int i = 0; i < block; ++i) largest = std::max(largest, sample());
-    if (blocks == 0) first = largest;
-    if (!(largest < 20.0 * first)) return Fate::grows;
-    if (largest < 0.05 * first) return Fate::decays;
-  }
-  return Fate::undecided;
+  return fate_of(handle_of(loop, delay), loop, stiffness, samples_per_e_fold, delay);
 }
 
 double samples_per_e_fold(const Loop& loop, double stiffness) {
