@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host_tools/base/terminal_text.hpp"
+#include "host_tools/check/bent_loop.hpp"
 #include "host_tools/device/value_text.hpp"
 
 namespace kmax::check {
@@ -28,14 +29,25 @@ std::string margin_text(const std::optional<double>& margin) {
                                   : "< -1000 %";
 }
 
-std::string case_text(const control::StabilityCase<double>& c, const std::string& hand) {
+std::string tip_text(const simulation::StructureModel& structure, double stiffness) {
+  std::string text = fmt::format("tip     {:g} kg behind {:g} N/m and {:g} N s/m", structure.handle_mass,
+                                 structure.stiffness, structure.damping);
+  if (stiffness > 0)
+    text += fmt::format("; a hand there feels K as {:.4g} N/m", felt_stiffness(stiffness, structure));
+  return text + "\n";
+}
+
+std::string case_text(const control::StabilityCase<double>& c, const Structure& structure,
+                      const std::string& hand) {
   std::string text = fmt::format("wall    K {:g} N/m, B {:g} N s/m", c.stiffness, c.wall_damping);
   if (c.magnetic_coefficient > 0)
     text +=
         fmt::format(", F_MC up to {:g} N over x_0 {:g} mm", c.magnetic_coefficient, c.magnetic_length * 1e3);
   text += fmt::format("\nloop    T {:.4g} ms, T_d {:.4g} ms, quantum {:.4g} mm, force limit {:g} N\n",
                       c.period * 1e3, c.delay * 1e3, c.quantum * 1e3, c.force_limit);
-  text += fmt::format("device  m {:g} kg, b {:g} N s/m, f_c {:g} N\n", c.mass, c.damping, c.friction);
+  text += fmt::format("device  m {:g} kg, b {:g} N s/m, f_c {:g} N{}\n", c.mass, c.damping, c.friction,
+                      structure ? ", all on the motor's side" : "");
+  if (structure) text += tip_text(*structure, c.stiffness);
   text += fmt::format("hand    {}", hand);
   if (c.hand.hand_mass > 0)
     text += fmt::format(": grip {:g} N/m {:g} N s/m, mass {:g} kg, arm {:g} N/m {:g} N s/m",
@@ -65,19 +77,20 @@ std::string why_not_exact(const control::StabilityCase<double>& c) {
   return "its numbers are too far apart";
 }
 
-std::string why_not(Criterion criterion, const control::StabilityCase<double>& c) {
+std::string why_not(Criterion criterion, const control::StabilityCase<double>& c, bool bends) {
   const std::string_view needs = text_of(criterion).needs;
   if (criterion == Criterion::field_slope) return fmt::format("needs {}", needs);
   if (has_no_wall(c)) return c.magnetic_coefficient > 0 ? why_not_exact(c) : "there is no wall";
   if (criterion == Criterion::sampled_eigenvalues) return why_not_exact(c);
+  if (bends && !text_of(criterion).covers_structure) return std::string(text_of(criterion).with_structure);
   return c.stiffness > 0 ? fmt::format("needs {}", needs) : "wall.stiffness is 0";
 }
 
-std::string row(const Verdict& verdict, const control::StabilityCase<double>& c) {
+std::string row(const Verdict& verdict, const control::StabilityCase<double>& c, bool bends) {
   const control::CriterionResult<double>& result = verdict.result;
   const CriterionText& text = text_of(result.criterion);
   if (!result.applies)
-    return fmt::format("  {:<20} not judged: {}\n", text.name(), why_not(result.criterion, c));
+    return fmt::format("  {:<20} not judged: {}\n", text.name(), why_not(result.criterion, c, bends));
   return fmt::format("  {:<20} {:>10} {:<2} {:>10}  {:<4} {:>9}  {}\n", text.name(), number(result.value),
                      text.relation, number(result.bound), text.unit, margin_text(verdict.margin),
                      result.pass ? "met" : "NOT MET");
@@ -110,12 +123,23 @@ std::string remedies(const Judgement& judgement, std::size_t width) {
   return "\nWhat would meet them, each change by itself:\n" + text;
 }
 
+/// With nobody at the handle: what gil estimates of a rigid device, and the exact loop shows of one that
+/// bends.
+bool may_vibrate_alone(const Judgement& judgement) {
+  if (!judgement.structure) {
+    const auto& gil = judgement.verdicts[static_cast<std::size_t>(Criterion::gil)].result;
+    return gil.applies && !gil.pass;
+  }
+  control::StabilityCase<double> alone = judgement.stability_case;
+  alone.hand = {};
+  return !judge(Criterion::sampled_eigenvalues, alone, judgement.structure).pass;
+}
+
 std::string conclusion(const Judgement& judgement, std::size_t width) {
   const auto of = [&judgement](Criterion criterion) -> const control::CriterionResult<double>& {
     return judgement.verdicts[static_cast<std::size_t>(criterion)].result;
   };
-  const control::CriterionResult<double>&exact = of(Criterion::sampled_eigenvalues),
-        &gil = of(Criterion::gil);
+  const control::CriterionResult<double>& exact = of(Criterion::sampled_eigenvalues);
   const control::StabilityCase<double>& c = judgement.stability_case;
   const bool guaranteed = judgement.guarantees_met();
   const bool held = c.hand.hand_mass > 0;
@@ -125,7 +149,7 @@ std::string conclusion(const Judgement& judgement, std::size_t width) {
   if (!exact.applies)
     text += has_no_wall(c) ? "The exact loop leaves out the field, and there is nothing else. "
                            : fmt::format("The exact loop could not be judged: {}. ", why_not_exact(c));
-  if (!exact.pass && control::is_stable(control::sampled_loop_of(c), c.stiffness))
+  if (!exact.pass && is_stable(c, judgement.structure))
     text += fmt::format(
         "The stiffness is beyond the first loss of stability {}: softer walls are unstable, this one is not, "
         "and it takes little to lose that again. ",
@@ -140,7 +164,11 @@ std::string conclusion(const Judgement& judgement, std::size_t width) {
     text += "Nothing is guaranteed: if you try it, then with a low force.limit first. ";
   else if (judgement.guaranteed())
     text += "Stable with every passive hand, as far as the assumptions hold ('kmax check --explain'). ";
-  if (exact.pass && held && gil.applies && !gil.pass) text += "Let go inside the wall, it may vibrate. ";
+  if (judgement.structure && judgement.guaranteed())
+    text +=
+        "With this structure that rests on guard.damping and guard.friction being those of the motor's side "
+        "alone, where the encoder is. ";
+  if (exact.pass && held && may_vibrate_alone(judgement)) text += "Let go inside the wall, it may vibrate. ";
   if (!(c.damping > 0) && !guaranteed)
     text += "guard.damping is 0: without a measured b no wall is guaranteed (docs/stability_check.md). ";
   if (judgement.uncovered_damper)
@@ -173,17 +201,17 @@ std::string text_of(const Change& change) {
 }
 
 std::string judgement_text(const Judgement& judgement, const std::string& hand, std::size_t width) {
-  std::string text = fitted(case_text(judgement.stability_case, hand), width, 8);
+  std::string text = fitted(case_text(judgement.stability_case, judgement.structure, hand), width, 8);
   text += fmt::format("\n  {:<20} {:>10}    {:>10}  {:<4} {:>9}  {}\n", "criterion", "value", "bound", "unit",
                       "margin", "verdict");
   for (const Worth worth : {Worth::guarantee, Worth::necessary, Worth::heuristic}) {
     text += fitted(fmt::format("{} ({})", name_of(worth), meaning_of(worth)), width, 2);
     for (const Verdict& verdict : judgement.verdicts) {
       if (text_of(verdict.result.criterion).worth == worth)
-        text += fitted(row(verdict, judgement.stability_case), width, 23);
+        text += fitted(row(verdict, judgement.stability_case, judgement.structure.has_value()), width, 23);
     }
   }
-  text += region_text(judgement.stability_case);
+  if (!judgement.structure) text += region_text(judgement.stability_case);
   return text + remedies(judgement, width) + conclusion(judgement, width);
 }
 

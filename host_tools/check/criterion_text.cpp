@@ -19,7 +19,10 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "first order; a b that is only measured at low speed may be smaller at the rate of the loop.",
      "",
      "J. E. Colgate and G. G. Schenkel, Passivity of a class of sampled-data systems: application to haptic "
-     "interfaces, J. Robotic Systems 14(1), 1997."},
+     "interfaces, J. Robotic Systems 14(1), 1997.",
+     true,
+     "it holds unchanged, with the encoder on the motor's side and b of that side alone: structure, tip and "
+     "hand together are a passive load, and m does not appear (own argument)"},
     {Criterion::gil, Worth::heuristic, "N/m", "K", "<", "(b + B) / (T/2 + T_d)",
      "An estimate, in closed form, of where the linear loop with nobody at the handle turns unstable: close "
      "while (b + B)(T + T_d)/m is well below 1, and off to either side beyond. sampled_eigenvalues is exact, "
@@ -27,7 +30,8 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "",
      "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche and G. Hirzinger, Stability boundary for haptic "
      "rendering: influence of damping and delay, J. Computing and Information Science in Engineering 9(1), "
-     "2009."},
+     "2009.",
+     false, "an estimate for one mass; sampled_eigenvalues has the structure"},
     {Criterion::sampled_eigenvalues, Worth::necessary, "N/m", "K", "<",
      "the smallest K at which an eigenvalue of the sampled loop leaves the unit circle",
      "Exact for the linear model: m, b, the hand of --hand, zero-order hold, wall damper by difference, "
@@ -35,7 +39,10 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "what it calls unstable; a hand that grips otherwise moves the limit, often several times.",
      "a device.mass and a delay of at most 8 periods",
      "K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, chapter on sampling of continuous-time "
-     "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012."},
+     "systems; the hand after M. J. Fu and M. C. Cavusoglu, 2012.",
+     true,
+     "the exact loop of both masses with the spring and the damper between them; encoder, motor and b on the "
+     "motor's side, the hand on the tip"},
     {Criterion::abbott_okamura, Worth::heuristic, "N/m", "K",
      "<=", "min(2 b / T, 2 (f_c / quantum - |B| / T))",
      "A spring wall without delay on a mass with Coulomb and viscous friction whose encoder has this "
@@ -46,7 +53,10 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "here the step.",
      "",
      "J. J. Abbott and A. M. Okamura, Effects of position quantization and sampling rate on virtual-wall "
-     "passivity, IEEE Trans. Robotics 21(5), 2005."},
+     "passivity, IEEE Trans. Robotics 21(5), 2005.",
+     true,
+     "it holds as it stands, with encoder, b and f_c on the motor's side: it allows any passive load, and m "
+     "does not appear (own argument)"},
     {Criterion::diolaiti, Worth::heuristic, "m/s", "v, the operator's speed", "<",
      "f_c / (K (T/2 + T_d) - b)",
      "Where viscous damping is too small for the spring (K (T/2 + T_d) > b), Coulomb friction still stops "
@@ -55,15 +65,18 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "2 T_d for T; the escape speed is derived from the same balance.",
      "guard.operator_speed",
      "N. Diolaiti, G. Niemeyer, F. Barbagli and J. K. Salisbury, Stability of haptic rendering: "
-     "discretization, quantization, time delay, and Coulomb effects, IEEE Trans. Robotics 22(2), 2006."},
+     "discretization, quantization, time delay, and Coulomb effects, IEEE Trans. Robotics 22(2), 2006.",
+     false, "its energies are those of one mass, and the tip moves at another speed than the motor's side"},
     {Criterion::resolution, Worth::heuristic, "N", "K max(quantum, v T)", "<=", "F_h, the operator's force",
      "Quasi-static: the step of force that one quantum, or the depth reached before the wall is noticed, "
      "makes must not exceed what the operator holds against. The wall counts as noticed one whole period "
      "late, the worst case. It says nothing of dynamics and is no passivity condition.",
-     "guard.operator_force", "Paper 2, on position resolution and stability, eqs. 2 to 7."},
+     "guard.operator_force", "Paper 2, on position resolution and stability, eqs. 2 to 7.", false,
+     "the hand holds the tip, not the motor's side, where the force steps"},
     {Criterion::resolution_speed, Worth::heuristic, "m/s", "v, the operator's speed", "<=", "F_h / (K T)",
      "The same estimate solved for the speed: an upper bound, for an approach noticed one whole period late.",
-     "guard.operator_force and guard.operator_speed", "Paper 2, eq. 8."},
+     "guard.operator_force and guard.operator_speed", "Paper 2, eq. 8.", false,
+     "the hand holds the tip, not the motor's side, which enters the wall"},
     {Criterion::field_slope, Worth::guarantee, "N/m", "2 F_MC / x_0", "<",
      "min((b - |B|) / (T/2 + T_d), 2 (f_c / quantum - |B| / T))",
      "The magnetic field is steepest at the surface; there it is a spring of 2 F_MC / x_0, to which colgate "
@@ -72,11 +85,13 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "velocity is not counted.",
      "a wall.law with a field above 0",
      "Colgate and Schenkel 1997, Abbott and Okamura 2005, with the slope of eq. 5 of paper 1, on impedance "
-     "tuning."},
+     "tuning.",
+     true, "it holds as colgate and the step of abbott_okamura do"},
     {Criterion::saturation_depth, Worth::heuristic, "m", "(force limit - F_MC) / K", ">=", "3 quanta",
      "Deeper than this the force is clipped: a wall that saturates within three encoder steps is a switch "
      "between no force and all of it, and what is then found to be 'stable' is bounded by the clip.",
-     "force.limit above 0 and a wall with stiffness", "A rule of this project."},
+     "force.limit above 0 and a wall with stiffness", "A rule of this project.", true,
+     "as it stands: the depth is that of the motor's side, where the encoder is"},
 }};
 
 constexpr bool in_order() {
@@ -172,6 +187,9 @@ std::string explanation(Criterion criterion, std::size_t width) {
       wrapped(fmt::format("{} {} {}   [{}]", text.value, text.relation, text.bound, text.unit), "  ", width);
   if (!text.needs.empty()) out += wrapped(fmt::format("Judged only with {}.", text.needs), "  ", width);
   out += wrapped(text.assumptions, "  ", width);
+  out += wrapped(fmt::format("With a structure between motor and handle{}: {}.",
+                             text.covers_structure ? "" : " it is not judged", text.with_structure),
+                 "  ", width);
   return out + wrapped(fmt::format("Source: {}", text.source), "  ", width);
 }
 

@@ -27,6 +27,8 @@ struct CriterionText {
   std::string_view assumptions;  ///< and where it does not hold
   std::string_view needs;        ///< what must be known for it to apply; empty: it always applies
   std::string_view source;
+  bool covers_structure;            ///< it is judged of a device that bends between motor and handle, too
+  std::string_view with_structure;  ///< what it is worth there, or why it is not judged then
 
   /// As in JSON and on the command line; the object dictionary's names of guard.criterion.
   std::string_view name() const;

@@ -74,9 +74,10 @@ std::string_view to_string(control::DiolaitiRegion region) {
   return "unstable";
 }
 
-Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
-                           const control::Hand<double>& hand) {
+Judgement judge_parameters(const ParameterValues& values, std::size_t axis, const control::Hand<double>& hand,
+                           const Structure& structure) {
   Judgement judgement{parameter_case(values, axis, hand), {}, true, {}};
+  judgement.structure = structure;
   judgement.follows_velocity = control::follows_velocity(values.choice<control::WallKind, "wall.law">(axis));
   using control::VelocityEstimatorKind;
   const auto estimator = values.choice<VelocityEstimatorKind, "velocity.estimator">(axis);
@@ -90,13 +91,13 @@ Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
   for (std::size_t i = 0; i < control::criterion_count; ++i) {
     const auto criterion = static_cast<control::Criterion>(i);
     Verdict& verdict = judgement.verdicts[i];
-    verdict.result = control::judge(criterion, judgement.stability_case);
+    verdict.result = judge(criterion, judgement.stability_case, structure);
     verdict.margin = margin_of(verdict.result);
     if (verdict.result.pass) continue;
     failed.push_back(criterion);
     verdict.changes = find_changes(values, axis, [&](const ParameterValues& changed) {
       // A criterion that is only switched off is not met.
-      return met(control::judge(criterion, parameter_case(changed, axis, hand)));
+      return met(judge(criterion, parameter_case(changed, axis, hand), structure));
     });
   }
   judgement.pass = failed.empty();
@@ -105,9 +106,9 @@ Judgement judge_parameters(const ParameterValues& values, std::size_t axis,
       const auto c = parameter_case(changed, axis, hand);
       // What fails now is the likeliest to fail again.
       for (const control::Criterion criterion : failed) {
-        if (!met(control::judge(criterion, c))) return false;
+        if (!met(judge(criterion, c, structure))) return false;
       }
-      const auto results = control::judge_all(c);
+      const auto results = judge_all(c, structure);
       return std::all_of(results.begin(), results.end(), [](const auto& result) { return result.pass; });
     });
   }

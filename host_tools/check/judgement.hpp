@@ -9,6 +9,7 @@
 
 #include "control/stability_criteria.hpp"
 #include "firmware/parameters/parameter_values.hpp"
+#include "host_tools/check/case_judgement.hpp"
 #include "host_tools/check/criterion_text.hpp"
 #include "host_tools/device/parameter.hpp"
 
@@ -42,6 +43,8 @@ struct Judgement {
   bool uncovered_damper = false;  ///< B with a velocity that is neither a difference nor a low-passed one
   bool grows = false;             ///< the stiffness begins lower than what is judged
 
+  Structure structure{};  ///< that the device bends by; with one the case's mass is of the motor's side alone
+
   bool pass_of(Worth worth) const;
   /// All that a guarantee asks for: what guarantees, and the step of abbott_okamura, which no delay changes.
   bool guarantees_met() const;
@@ -70,9 +73,9 @@ std::string_view to_string(control::DiolaitiRegion region);
 double escape_speed_of(const control::StabilityCase<double>& c);
 
 /// `values` keep the rules between parameters. Takes about a millisecond, more when much fails: then single
-/// parameters are searched for values that help.
+/// parameters are searched for values that help. `structure`: see case_judgement.hpp.
 Judgement judge_parameters(const firmware::ParameterValues& values, std::size_t axis,
-                           const control::Hand<double>& hand);
+                           const control::Hand<double>& hand, const Structure& structure = {});
 
 /// What the criteria judge of one axis, see firmware/drive/stability_case.hpp: with the hand that holds it,
 /// and each number as the user wrote it: 0.1, not the 0.100000001490116 of the float that is nearest to it.

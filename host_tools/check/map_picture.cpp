@@ -79,6 +79,9 @@ std::string title_of(const StabilityMap& map, const firmware::ParameterValues& v
                          device::value_with_unit(
                              parameter, values.raw(firmware::slot_of(parameter.entry(), parameter.axis()))));
   }
+  if (map.structure)
+    title += fmt::format("structure {:g} N/m, tip {:g} kg, ", map.structure->stiffness,
+                         map.structure->handle_mass);
   return title + "hand " + hand;
 }
 }  // namespace

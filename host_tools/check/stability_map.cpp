@@ -86,10 +86,11 @@ MapAxis parse_map_axis(std::string_view text, std::size_t default_axis) {
 }
 
 StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t axis,
-                           const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y) {
+                           const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y,
+                           const Structure& structure) {
   if (x.parameter == y.parameter)
     throw ValueError(fmt::format("--map: both sides are {}; name two parameters", x.parameter.name()));
-  StabilityMap map{x, y, {}};
+  StabilityMap map{x, y, {}, structure};
   map.results.reserve(x.points * y.points);
   firmware::ParameterValues at_point = values;
   const auto set = [&at_point](const Parameter& parameter, double value) {
@@ -100,7 +101,7 @@ StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t 
     set(y.parameter, y.at(row));
     for (std::size_t column = 0; column < x.points; ++column) {
       set(x.parameter, x.at(column));
-      map.results.push_back(control::judge_all(parameter_case(at_point, axis, hand)));
+      map.results.push_back(judge_all(parameter_case(at_point, axis, hand), structure));
     }
   }
   return map;

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "control/stability_criteria.hpp"
 #include "firmware/parameters/parameter_values.hpp"
+#include "host_tools/check/case_judgement.hpp"
 #include "host_tools/device/parameter.hpp"
 #include "host_tools/plot/map_figure.hpp"
 
@@ -30,12 +29,11 @@ struct MapAxis {
 /// that are no real numbers, or only read.
 MapAxis parse_map_axis(std::string_view text, std::size_t default_axis);
 
-using Results = std::array<control::CriterionResult<double>, control::criterion_count>;
-
 /// All criteria at every point of two parameters.
 struct StabilityMap {
   MapAxis x, y;
   std::vector<Results> results;  ///< y.points rows of x.points
+  Structure structure{};         ///< the same at every point
 
   const Results& at(std::size_t column, std::size_t row) const { return results[row * x.points + column]; }
 };
@@ -43,7 +41,8 @@ struct StabilityMap {
 /// Rules between parameters (haptic.rate divides 20000 Hz) are not asked for: the map is of the criteria.
 /// Throws base::ValueError if both sides are the same parameter.
 StabilityMap map_stability(const firmware::ParameterValues& values, std::size_t axis,
-                           const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y);
+                           const control::Hand<double>& hand, const MapAxis& x, const MapAxis& y,
+                           const Structure& structure = {});
 
 /// One row per point: the two parameters, whether all criteria pass, and each criterion; 1 passes, 0 fails,
 /// empty where it does not apply. Throws std::runtime_error if the file cannot be written.

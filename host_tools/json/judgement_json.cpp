@@ -1,6 +1,7 @@
 #include "host_tools/json/judgement_json.hpp"
 
 #include "host_tools/base/numbers.hpp"
+#include "host_tools/check/bent_loop.hpp"
 #include "host_tools/check/criterion_text.hpp"
 
 namespace kmax::json {
@@ -47,27 +48,36 @@ Json judgement_json(const check::Judgement& judgement, const std::string& hand) 
   Json worths = Json::object();
   for (const check::Worth worth : {check::Worth::guarantee, check::Worth::necessary, check::Worth::heuristic})
     worths[std::string(check::name_of(worth))] = judgement.pass_of(worth);
-  return {{"pass", judgement.pass},
-          {"pass_by_worth", worths},
-          {"guaranteed", judgement.guaranteed()},
-          {"criteria", criteria},
-          {"changes", changes_json(judgement.changes)},
-          {"diolaiti_region", std::string(check::to_string(check::region_of(c)))},
-          {"case",
-           {{"stiffness_n_per_m", c.stiffness},
-            {"wall_damping_n_s_per_m", c.wall_damping},
-            {"magnetic_coefficient_n", c.magnetic_coefficient},
-            {"magnetic_length_m", c.magnetic_length},
-            {"period_s", c.period},
-            {"delay_s", c.delay},
-            {"quantum_m", c.quantum},
-            {"mass_kg", c.mass},
-            {"damping_n_s_per_m", c.damping},
-            {"friction_n", c.friction},
-            {"operator_force_n", c.operator_force},
-            {"operator_speed_m_per_s", c.operator_speed},
-            {"force_limit_n", c.force_limit},
-            {"hand", hand}}}};
+  Json document = {{"pass", judgement.pass},
+                   {"pass_by_worth", worths},
+                   {"guaranteed", judgement.guaranteed()},
+                   {"criteria", criteria},
+                   {"changes", changes_json(judgement.changes)},
+                   {"diolaiti_region", std::string(check::to_string(check::region_of(c)))},
+                   {"case",
+                    {{"stiffness_n_per_m", c.stiffness},
+                     {"wall_damping_n_s_per_m", c.wall_damping},
+                     {"magnetic_coefficient_n", c.magnetic_coefficient},
+                     {"magnetic_length_m", c.magnetic_length},
+                     {"period_s", c.period},
+                     {"delay_s", c.delay},
+                     {"quantum_m", c.quantum},
+                     {"mass_kg", c.mass},
+                     {"damping_n_s_per_m", c.damping},
+                     {"friction_n", c.friction},
+                     {"operator_force_n", c.operator_force},
+                     {"operator_speed_m_per_s", c.operator_speed},
+                     {"force_limit_n", c.force_limit},
+                     {"hand", hand}}}};
+  if (const auto& structure = judgement.structure) {
+    // The region is of one mass.
+    document["diolaiti_region"] = nullptr;
+    document["case"]["structure_stiffness_n_per_m"] = structure->stiffness;
+    document["case"]["structure_damping_n_s_per_m"] = structure->damping;
+    document["case"]["handle_mass_kg"] = structure->handle_mass;
+    document["case"]["felt_stiffness_n_per_m"] = check::felt_stiffness(c.stiffness, *structure);
+  }
+  return document;
 }
 
 }  // namespace kmax::json

@@ -128,6 +128,7 @@ class Documents(unittest.TestCase):
         "wall": [("--position", "0"), ("--csv", "FOLDER/points.csv", "--out", "FOLDER/forces.csv"),
                  ("--picture", "FOLDER/w.svg")],
         "check": [(), ("--set", "wall.law=magnetic", "--set", "guard.damping=0.5", "--hand", "subject_1"), ("--explain",),
+                  ("--set", "structure.stiffness=2.31N/mm"),
                   ("--map", "wall.stiffness=100..10000,4", "--map", "guard.damping=0.1..10,4", "--csv", "FOLDER/m.csv")],
         "simulate": [("touch",), ("touch", "--set", "motion.approach_speed=0.05"), ("--keys",)],
         "sweep": [("touch", "--set", "wall.stiffness=1000,2000", "--set", "wall.law=plain,magnetic"),

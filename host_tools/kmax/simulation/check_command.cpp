@@ -16,6 +16,7 @@
 #include "host_tools/device/value_text.hpp"
 #include "host_tools/json/judgement_json.hpp"
 #include "host_tools/kmax/commands.hpp"
+#include "host_tools/kmax/experiment/experiment_options.hpp"
 #include "host_tools/plot/gnuplot_picture.hpp"
 
 namespace kmax::cli {
@@ -32,7 +33,10 @@ struct CheckOptions {
   const CLI::Option* explain = nullptr;  ///< --explain, which may be given without a name
 
   void declare(CLI::App& command) {
-    command.add_option("--set", assignments, "Parameter to judge in place of the device's; may be repeated")
+    command
+        .add_option("--set", assignments,
+                    "Parameter to judge in place of the device's, or a number of the structure that bends "
+                    "between motor and handle (structure.stiffness, .damping, .handle_mass); may be repeated")
         ->type_name("NAME=VALUE")
         ->take_all();
     command
@@ -55,14 +59,57 @@ struct CheckOptions {
   }
 };
 
+/// --set, by what it sets.
+struct Settings {
+  std::vector<std::string> of_parameters;
+  check::Structure structure;
+};
+
+/// A structure is read as that of simulated touches is ('kmax experiment'); what is not set of it has its
+/// default. UsageError or base::ValueError.
+Settings settings_of(Context& context, const CheckOptions& options) {
+  Settings settings;
+  std::vector<std::string> of_structure;
+  for (const std::string& text : options.assignments) {
+    std::string_view name = base::trimmed(text);
+    const std::size_t dot = name.find('.');
+    const bool on_axis = name.starts_with("axis") && dot != std::string_view::npos;
+    const std::string_view axis = on_axis ? name.substr(0, dot) : std::string_view();
+    if (on_axis) name.remove_prefix(dot + 1);
+    if (!name.starts_with("structure.")) {
+      settings.of_parameters.push_back(text);
+    } else if (on_axis && axis != fmt::format("axis{}", context.axis())) {
+      context.note(fmt::format("{} is not judged by any criterion of axis {}", text, context.axis()));
+    } else {
+      of_structure.emplace_back(name);
+    }
+  }
+  if (!of_structure.empty())
+    settings.structure = touch_changes(of_structure, experiment::Touching::set_of_people)
+                             .simulated_device()
+                             .axes.front()
+                             .device.structure;
+  return settings;
+}
+
+/// A side of a map; what is no parameter of the device has one value all over it.
+MapAxis map_side(const std::string& text, std::size_t axis) {
+  if (base::trimmed(text).starts_with("structure."))
+    throw UsageError(fmt::format(
+        "--map {}: a map's sides are parameters of the device; give the structure with --set, and it "
+        "is the same at every point of the map",
+        text));
+  return check::parse_map_axis(text, axis);
+}
+
 std::size_t slot_of(const Parameter& parameter) {
   return firmware::slot_of(parameter.entry(), parameter.axis());
 }
 
 /// The device's parameters, as far as they are judged or asked for, with those of --set in their place.
-firmware::ParameterValues values_of(Context& context, const CheckOptions& options,
+firmware::ParameterValues values_of(Context& context, const std::vector<std::string>& settings,
                                     const std::vector<MapAxis>& sides) {
-  const auto assignments = device::parse_assignments(options.assignments, context.axis());
+  const auto assignments = device::parse_assignments(settings, context.axis());
   std::vector<Parameter> read = check::parameters_of_case(context.axis());
   read.push_back(Parameter::of<"velocity.estimator">(context.axis()));  // what the guarantees cover
   for (const auto& assignment : assignments) {
@@ -93,8 +140,10 @@ std::size_t text_width(const Context& context) {
 
 int judge_set(Context& context, const CheckOptions& options) {
   const check::HandChoice hand = check::choose_hand(options.hand);
-  const firmware::ParameterValues values = values_of(context, options, {});
-  const check::Judgement judgement = check::judge_parameters(values, context.axis(), hand.hand);
+  const Settings settings = settings_of(context, options);
+  const firmware::ParameterValues values = values_of(context, settings.of_parameters, {});
+  const check::Judgement judgement =
+      check::judge_parameters(values, context.axis(), hand.hand, settings.structure);
   if (context.json) {
     context.print(json::judgement_json(judgement, hand.name));
   } else {
@@ -134,14 +183,16 @@ int draw_map(Context& context, const CheckOptions& options) {
   if (options.picture.empty() && options.csv.empty())
     throw UsageError("--map needs --picture FILE.svg, --csv FILE, or both");
   std::vector<MapAxis> sides;
-  for (const std::string& side : options.sides) sides.push_back(check::parse_map_axis(side, context.axis()));
+  for (const std::string& side : options.sides) sides.push_back(map_side(side, context.axis()));
   if (sides[0].parameter == sides[1].parameter)
     throw UsageError(fmt::format("--map: both sides are {}; name two parameters", sides[0].parameter.name()));
   if (!options.picture.empty()) plot::require_picture_name(options.picture);
   if (!options.csv.empty()) base::check_writable(options.csv);
   const check::HandChoice hand = check::choose_hand(options.hand);
-  const firmware::ParameterValues values = values_of(context, options, sides);
-  const check::StabilityMap map = check::map_stability(values, context.axis(), hand.hand, sides[0], sides[1]);
+  const Settings settings = settings_of(context, options);
+  const firmware::ParameterValues values = values_of(context, settings.of_parameters, sides);
+  const check::StabilityMap map =
+      check::map_stability(values, context.axis(), hand.hand, sides[0], sides[1], settings.structure);
   if (!options.csv.empty()) check::write_map_csv(map, options.csv);
   if (!options.picture.empty() && !check::write_map_picture(map, values, hand.name, options.picture))
     context.note("the present parameters lie outside the map and are not marked");
@@ -199,6 +250,7 @@ int explain(Context& context, const std::vector<std::string>& names) {
                      {"unit", std::string(text.unit)},
                      {"needs", std::string(text.needs)},
                      {"assumptions", std::string(text.assumptions)},
+                     {"with_structure", std::string(text.with_structure)},
                      {"source", std::string(text.source)}});
     }
     context.print({{"criteria", all}});
@@ -237,7 +289,11 @@ void add_check_command(CLI::App& app, Context& context) {
 
 Sets nothing. 'pass' means that every criterion that applies is met; most walls in use are without a guarantee and
 still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.
-See docs/stability_check.md. Exit code of a map: 0.)"},
+See docs/stability_check.md. Exit code of a map: 0.
+
+A device that bends: --set structure.stiffness=2.3N/mm and, in place of their
+defaults, structure.damping and structure.handle_mass ('kmax simulate --keys'). device.mass,
+guard.damping and guard.friction are then of the motor's side, and the hand holds the tip.)"},
       Takes::device_and_axis, run_check);
 }
 

@@ -18,7 +18,8 @@ TEST(CriterionText, EveryCriterionIsExplainedOnce) {
     EXPECT_EQ(text.criterion, criterion);
     EXPECT_EQ(criterion_of(text.name()), criterion);
     EXPECT_TRUE(names.insert(text.name()).second) << text.name();
-    for (const std::string_view part : {text.unit, text.value, text.bound, text.assumptions, text.source})
+    for (const std::string_view part :
+         {text.unit, text.value, text.bound, text.assumptions, text.source, text.with_structure})
       EXPECT_FALSE(part.empty()) << text.name();
     const std::string all = explanation(criterion);
     for (const std::string_view part : {text.name(), name_of(text.worth), text.unit})

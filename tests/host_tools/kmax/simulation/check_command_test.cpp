@@ -128,6 +128,64 @@ TEST_F(Check, AHandIsNamedOrReadFromAFile) {
   expect_error({"check", "--hand", "subject_99"}, base::wrong_usage, "none, subject_1");
 }
 
+TEST_F(Check, AStructureIsSetAsThatOfSimulatedTouches) {
+  const std::vector<std::string> rigid = {"guard.damping=0.4", "haptic.rate=1000", "device.mass=0.025",
+                                          "wall.stiffness=3.58N/mm"};
+  std::vector<std::string> bent = rigid;
+  bent.push_back("structure.stiffness=2.31N/mm");
+  check(rigid, {"--json"});
+  const double bound = criterion("sampled_eigenvalues")["bound"];
+  EXPECT_FALSE(document()["case"].contains("structure_stiffness_n_per_m"));
+  check(bent, {"--json"});
+  EXPECT_EQ(document()["case"]["structure_stiffness_n_per_m"], 2310.0);
+  EXPECT_EQ(document()["case"]["structure_damping_n_s_per_m"], 1.0) << "as a scene's";
+  EXPECT_EQ(document()["case"]["handle_mass_kg"], 0.02);
+  EXPECT_NEAR(document()["case"]["felt_stiffness_n_per_m"].get<double>(), 1404.1, 0.1);
+  EXPECT_EQ(document()["case"]["mass_kg"], 0.025) << "of the motor's side";
+  EXPECT_TRUE(document()["diolaiti_region"].is_null());
+  EXPECT_EQ(criterion("gil")["applies"], false);
+  EXPECT_TRUE(criterion("gil")["bound"].is_null());
+  EXPECT_EQ(criterion("colgate")["applies"], true);
+  EXPECT_NE(criterion("sampled_eigenvalues")["bound"], bound);
+  bent.insert(bent.end(), {"structure.handle_mass=10g", "axis0.structure.damping=0"});
+  EXPECT_EQ(check(bent), base::verdict_is_no);
+  EXPECT_CONTAINS(output, "tip     0.01 kg behind 2310 N/m and 0 N s/m; a hand there feels K as 1404 N/m");
+  EXPECT_CONTAINS(output, "gil                  not judged: an estimate for one mass");
+  EXPECT_EQ(said.find("not judged by any criterion"), std::string::npos) << said;
+}
+
+TEST_F(Check, AStructureThatIsNotAllowedIsWrongUsage) {
+  const auto set = [](const char* one) { return std::vector<std::string>{"check", "--set", one}; };
+  expect_error(set("structure.stiffness=nan"), base::wrong_usage, "allowed is a number from 1 to");
+  expect_error(set("structure.stiffness=-2310"), base::wrong_usage,
+               "structure.stiffness = '-2310': allowed is");
+  expect_error(set("structure.stiffness=0"), base::wrong_usage, "allowed is a number from 1 to");
+  expect_error(set("structure.damping=-1"), base::wrong_usage, "structure.damping");
+  expect_error(set("structure.handle_mass=0"), base::wrong_usage,
+               "allowed is a number from 0.0001 to 100 kg");
+  expect_error(set("structure.handle_mass=inf"), base::wrong_usage, "structure.handle_mass");
+  expect_error(set("structure.stiffness=2kg"), base::wrong_usage, "N/mm");
+  expect_error(set("structure.stifness=1"), base::wrong_usage, "structure.stiffness");
+  expect_error(set("structure.stiffness"), base::wrong_usage, "NAME=VALUE");
+  expect_error({"check", "--set", "structure.stiffness=1000", "--set", "structure.stiffness=2000"},
+               base::wrong_usage, "given twice");
+  check({"axis1.structure.stiffness=1000"}, {"--json"});
+  EXPECT_CONTAINS(said, "axis1.structure.stiffness=1000 is not judged by any criterion of axis 0");
+  EXPECT_FALSE(document()["case"].contains("handle_mass_kg"));
+}
+
+TEST_F(Check, AMapIsOfADeviceThatBends) {
+  std::vector<std::string> arguments =
+      map("wall.stiffness=0.1N/mm..10N/mm:log,12", "guard.damping=0.1..5,10");
+  arguments.insert(arguments.end(), {"--json", "--set", "structure.stiffness=1000"});
+  EXPECT_EQ(kmax(arguments), base::done) << said;
+  EXPECT_EQ(document()["points_that_pass"]["gil"], 0) << "does not apply";
+  EXPECT_GT(document()["points_that_pass"]["colgate"], 0);
+  EXPECT_CONTAINS(folder.read("map.svg"), "structure 1000 N/m, tip 0.02 kg");
+  expect_error(map("structure.stiffness=100..1000", "guard.damping=0.1..5"), base::wrong_usage,
+               "give the structure with --set");
+}
+
 TEST_F(Check, TheAxisAndItsParametersCount) {
   EXPECT_EQ(check({"axis1.guard.damping=5", "axis1.guard.friction=1"}, {"--axis", "1"}), base::done);
   EXPECT_EQ(check({"guard.damping=5", "guard.friction=1"}, {"--axis", "1"}), base::done);
