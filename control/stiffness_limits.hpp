@@ -26,7 +26,11 @@ namespace kmax::control {
 /// source's general condition, b > T/2 Re{(1 - e^-jwT) H}/(1 - cos wT), for H = (K + B (z - 1)/(T z)) z^-n:
 /// for a delay of n whole samples it is necessary and sufficient with B = 0, and sufficient with B, which
 /// charges high frequencies while the delay charges low ones. For parts of a sample it is a straight line
-/// between those; thousands of random passive hands were stable below it (tests).
+/// between those, below which thousands of random passive hands were stable (tests), but which an undamped
+/// heavy hand on a soft spring is not quite: the ripple that a held force makes of the position is then not 0
+/// at the samples, but acts as a damper of -K^2 T^3 (d^3 - 1.5 d^2 + 0.5 d)/(6 m), d the part of a sample.
+/// Such a hand may turn unstable at a K that is lower by up to 0.008 K T^2/m T/(T/2 + Td) of it, own
+/// derivation: by less than 0.1 % where b T/m is below 0.05.
 ///
 /// Does not hold as a limit of stability: with friction or a hand, walls many times stiffer are stable
 /// (sampled_stability.hpp, diolaiti_criterion.hpp). Nor is it sufficient with coarse quantization

@@ -92,6 +92,24 @@ TEST(ColgateCriterion, EveryPassiveHandIsStableBelowTheLimit) {
   EXPECT_GT(judged, 10000);
 }
 
+// For a part of a sample the limit is not quite safe: the worst hand is heavy, soft and undamped.
+TEST(ColgateCriterion, APartOfASampleOfDelayIsOffByAHundredthOfTheGain) {
+  constexpr double mass = 0.05, period = 1e-3;
+  for (const double gain : {0.03, 0.1, 0.3, 1.0}) {
+    double worst = 1.0;
+    for (double part = 0.05; part < 1.0; part += 0.05) {
+      const double delay = part * period, stiffness = gain * mass / (period * period);
+      const double damping = stiffness * (0.5 * period + delay);
+      ASSERT_NEAR(colgate_stiffness_limit(damping, 0.0, period, delay), stiffness, 1e-9 * stiffness);
+      const SampledLoop<double> loop{mass, damping, 0.0, period, delay, {1.0, 10.0, 0.0, 0.0, 0.0}};
+      const double share = largest_stable_stiffness(loop) / stiffness;
+      EXPECT_GT(share, 1.0 - 0.0085 * gain / (0.5 + part)) << gain << ' ' << part;
+      worst = std::min(worst, share);
+    }
+    EXPECT_NEAR(worst, 1.0 - 0.0113 * gain, 0.001 * gain) << gain;
+  }
+}
+
 TEST(GilCriterion, KnownNumbers) {
   EXPECT_DOUBLE_EQ(gil_stiffness_limit(1.0, 0.0, 1e-3, 0.0), 2000.0);
   EXPECT_DOUBLE_EQ(gil_stiffness_limit(1.0, 0.5, 1e-3, 0.25e-3), 2000.0);
