@@ -10,8 +10,9 @@
 namespace kmax::check {
 
 namespace {
-/// Of a spring per mass, in units of one sample: that of the stiffest structure with the lightest tip at the
-/// slowest rate. Up to there tests compare with eigenvalues by QR; far beyond it rounding would decide.
+/// Of a spring per mass, in units of one sample: ten times that of the stiffest structure with the lightest
+/// tip at the slowest rate, up to which tests compare with eigenvalues by QR. Far beyond, rounding would
+/// decide.
 constexpr double largest_rate = 1e9;
 
 /// In units of one sample, as control::HandleModel: the motor's position and velocity, then what that has for

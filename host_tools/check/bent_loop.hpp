@@ -31,7 +31,8 @@ bool is_stable(const BentLoop& loop, double stiffness);
 /// feels is softer, see felt_stiffness().
 ///
 /// With k_s to infinity it is the rigid loop's of the mass m + m_t, with m_t to 0 and nobody at the handle
-/// that of the mass m. It is never below colgate's bound: structure, tip and hand are passive.
+/// that of the mass m. It is no further below colgate's bound than that of any passive hand may be
+/// (control/stiffness_limits.hpp): structure, tip and hand are passive.
 ///
 /// Sharp resonances of the structure fall between two places at which that search looks along the unit
 /// circle; its test of stability below the bound finds what they do: looked at closely about each resonance,
@@ -39,7 +40,7 @@ bool is_stable(const BentLoop& loop, double stiffness);
 ///
 /// Trust: tests/host_tools/check/bent_loop_test.cpp compares it with the spectral radius by an independent
 /// matrix exponential and QR, and bent_loop_against_simulation_test.cpp with motions of a simulated handle.
-/// Cost: about 40 us on a PC.
+/// Cost: about 60 us on a PC.
 double largest_stable_stiffness(const BentLoop& loop);
 
 /// What of a wall's stiffness, N/m, there is at the tip: wall and structure in series, never more than the

@@ -11,8 +11,8 @@
 
 namespace kmax::check {
 
-// The motor's side as control::LoopDraw has it, which is where a third of the tips are far lighter, and a
-// structure from as soft as a hand to far stiffer than any wall; a quarter of them without damping.
+// The motor's side as control::LoopDraw has it, and a structure from as soft as a hand to far stiffer than
+// any wall, a quarter of them without damping; tips from far lighter to far heavier than the motor's side.
 inline BentLoop drawn_bent_loop(control::LoopDraw& draw) {
   BentLoop loop;
   loop.motor_side = draw.loop();
