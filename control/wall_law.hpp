@@ -85,7 +85,7 @@ class WallLaw {
     c.kind = config.kind;
     c.stiffness = GrowingStiffness<Scalar>::prepare(config.growing, config.stiffness, period);
     c.damping = config.damping;
-    c.magnetic_coefficient = config.kind == WallKind::magnetic ? config.magnetic_coefficient : Scalar(0);
+    c.magnetic_coefficient = constant_coefficient(config);
     c.inverse_magnetic_length = saturate(Scalar(1) / config.magnetic_length);
     c.adaptive = AdaptiveCoefficient<Scalar>::prepare(config.adaptive, period);
     return c;
@@ -132,6 +132,20 @@ class WallLaw {
 
  private:
   static constexpr Scalar largest = std::numeric_limits<Scalar>::max();
+
+  /// N, F_MC of a field that does not change. A kind that is not named here does not compile: update(), which
+  /// asks for the two that differ from a spring with such a field, would take it for one.
+  static constexpr Scalar constant_coefficient(const WallLawConfig<Scalar>& config) {
+    switch (config.kind) {
+      case WallKind::magnetic:
+        return config.magnetic_coefficient;
+      case WallKind::none:
+      case WallKind::plain:
+      case WallKind::adaptive:
+        break;
+    }
+    return Scalar(0);
+  }
 
   /// The wall does not pull; the field is added to what is left.
   static Scalar together(Scalar spring, Scalar damper, Scalar field) {

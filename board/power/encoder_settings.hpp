@@ -32,7 +32,9 @@ struct EncoderSettings {
     EncoderSettings next;
     bool chip_asked_for = false;
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-      if (values.whole<"encoder.kind">(axis) != 1 || absent[axis]) continue;
+      if (values.choice<firmware::EncoderKind, "encoder.kind">(axis) == firmware::EncoderKind::quadrature ||
+          absent[axis])
+        continue;
       next.role[axis] = chip_asked_for ? EncoderRole::missing : EncoderRole::chip;
       chip_asked_for = true;
     }

@@ -40,7 +40,8 @@ class Commutation {
   static bool known(const ParameterValues& values, std::size_t axis, bool referenced) {
     if (values.choice<MotorKind, "motor.kind">(axis) == MotorKind::dc) return true;
     if (values.whole<"motor.commutation_known">(axis) == 1) return true;
-    const bool lasting = values.whole<"encoder.kind">(axis) == 1 || values.whole<"encoder.start">(axis) == 1;
+    const bool lasting = values.choice<EncoderKind, "encoder.kind">(axis) == EncoderKind::as5047p ||
+                         values.whole<"encoder.start">(axis) == 1;
     return values.whole<"motor.calibrated">(axis) == 1 && (lasting || referenced);
   }
 

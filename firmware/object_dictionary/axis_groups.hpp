@@ -35,7 +35,10 @@ inline constexpr Group guard_status{"guard", 0x201A, Scope::axis, 0x0100};
 inline constexpr Group instability_status{"instability", 0x201B, Scope::axis, 0x0110};
 }  // namespace group
 
-/// What each choice is called; the numbers are the enumerations' own.
+enum class EncoderKind : std::uint8_t { quadrature, as5047p };
+
+/// What each choice is called. The numbers are the enumerations' own, in figures where an enumeration is
+/// defined above the dictionary.
 namespace names {
 template <typename Enumeration>
 constexpr NamedValue named(std::string_view name, Enumeration value) {
@@ -80,7 +83,8 @@ inline constexpr NamedValue instability_action[] = {
     named("off", InstabilityAction::off), named("warn", InstabilityAction::warn),
     named("soften", InstabilityAction::soften), named("trip", InstabilityAction::trip)};
 inline constexpr NamedValue motor_kind[] = {{"dc", 0}, {"pmsm", 1}};
-inline constexpr NamedValue encoder_kind[] = {{"quadrature", 0}, {"as5047p", 1}};
+inline constexpr NamedValue encoder_kind[] = {named("quadrature", EncoderKind::quadrature),
+                                              named("as5047p", EncoderKind::as5047p)};
 inline constexpr NamedValue encoder_start[] = {{"anywhere", 0}, {"at_rest", 1}};
 inline constexpr NamedValue encoder_index[] = {{"none", 0}, {"once_per_turn", 1}};
 inline constexpr NamedValue encoder_direction[] = {{"-1", -1}, {"+1", 1}};

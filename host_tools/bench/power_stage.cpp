@@ -14,7 +14,7 @@ struct KnownBoard {
   std::string_view name;
   const board::BoardDescription* power_stage;
 };
-// A new board with a bridge has its row here, and nothing else above board/ to be changed for it.
+// A new board with a bridge has its row here; what is flashed and packaged of it, in flash/board_profile.cpp.
 constexpr std::array<KnownBoard, 2> known_boards = {{
     {board::odrive_v3::description.name, &board::odrive_v3::description},
     // Simulated, it has the same power stage (simulated_board/simulated_power_hardware.hpp).

@@ -66,8 +66,8 @@ CheckResult check_index(device::Device& device, const Settings& settings, const 
   return check.fail(
       "encoder index",
       fmt::format("not seen within {:.0f} s although A and B count: check the wire of Z at J4, and its "
-                  "supply; see that "
-                  "the travel reaches it; for an encoder without this line set encoder.index=none",
+                  "supply; see that the travel reaches it; for an encoder without this line set "
+                  "encoder.index=none",
                   settings.patience));
 }
 
@@ -77,16 +77,16 @@ CheckResult check_stop(device::Device& device, const Settings& settings, const P
   if (open())
     return check.fail(
         "emergency stop",
-        "its line is open: release the button, or connect GPIO5 with GND of J3 by a wire; if that is "
-        "done, check plug and cable");
+        "its line is open: release the button, or connect GPIO5 with GND of J3 by a wire; if that is done, "
+        "check plug and cable");
   if (!settings.has_button) return check.pass("its line is closed, by a wire; nothing can stop the device");
   party.person.ask("Put a hand on the emergency stop, without pressing it yet");
   if (!wait_for(device, settings, party, "press the emergency stop", open))
     return check.fail(
         "emergency stop",
         fmt::format(
-            "nothing was seen of it within {:.0f} s: it must be a normally closed contact in series with "
-            "the wire from GPIO5 to GND; without a button give --no-button",
+            "nothing was seen of it within {:.0f} s: it must be a normally closed contact in series with the "
+            "wire from GPIO5 to GND; without a button give --no-button",
             settings.patience));
   if (!wait_for(device, settings, party, "release the emergency stop", [&] { return !open(); }))
     return check.fail("emergency stop", "its line did not close again: release it, check its contact");
@@ -128,10 +128,9 @@ CheckResult check_divider(double measured, std::optional<double> meter, double c
         "supply (beyond the range)",
         fmt::format(
             "the board measures {:.1f} V, the end of its range ({:.1f} V): the supply has that or more. "
-            "Switch "
-            "it off at once: the capacitors of a {:.0f} V board are rated for {:.0f} V, and may be broken "
-            "already; look for swollen ones. Allowed are {:.0f} V at most. If the supply's own meter never "
-            "showed more than that, the divider on the board is open",
+            "Switch it off at once: the capacitors of a {:.0f} V board are rated for {:.0f} V, and may be "
+            "broken already; look for swollen ones. Allowed are {:.0f} V at most. If the supply's own meter "
+            "never showed more than that, the divider on the board is open",
             measured, end, parts.supply, parts.capacitors, parts.supply));
   }
   if (!meter) return check.not_judged("give what the supply's own meter shows with --supply VOLT");
@@ -285,8 +284,8 @@ CheckResult check_brake(const Settings& settings, double brake_voltage, double s
                                   brake_voltage));
   if (ohm <= 0.0)
     return check.pass(
-        "none, and none is expected: a handle that is driven back raises the supply until "
-        "supply.voltage_max takes the force away");
+        "none, and none is expected: a handle that is driven back raises the supply until supply.voltage_max "
+        "takes the force away");
   if (brake_voltage <= 0.0)
     return check.fail(
         "supply.brake_voltage",
@@ -357,7 +356,8 @@ StageResult try_motor(device::Device& device, const Settings& settings, const Pa
   StageResult result;
   const auto index = device::Parameter::of<"encoder.index">(settings.axis);
   const bool has_index =
-      device.read(index) != 0 && device.read(device::Parameter::of<"encoder.kind">(settings.axis)) == 0;
+      device.read(index) != 0 && device.read(device::Parameter::of<"encoder.kind">(settings.axis)) ==
+                                     static_cast<std::uint32_t>(firmware::EncoderKind::quadrature);
   {
     Probe probe(device, settings.axis, party.progress);
     // A and B alone first.

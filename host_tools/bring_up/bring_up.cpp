@@ -5,6 +5,8 @@
 
 #include <chrono>
 
+#include "host_tools/bench/power_stage.hpp"
+
 namespace kmax::bring_up {
 
 namespace {
@@ -65,6 +67,8 @@ bool do_stage(Stage stage, device::Device& device, Report& report, const Setting
 
 bool bring_up(device::Device& device, Report& report, const Settings& settings, const Party& party,
               const std::function<void(const Report&)>& keep) {
+  // Its dividers, gate drivers and connectors are those that the stages speak of.
+  bench::power_stage_of(device);
   if (settings.only) {
     require_turn(report, settings);
     return do_stage(*settings.only, device, report, settings, party, keep);

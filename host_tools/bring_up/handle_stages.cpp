@@ -198,8 +198,8 @@ StageResult try_stiffer(device::Device& device, const Settings& settings, const 
   judged.values = {{"stiffness", stable, "N/m", 100.0, settings.stiffness}};
   if (stable <= 0.0) {
     result.checks = {judged.fail("wall parameters",
-                                 "no wall of 0.1 N/mm or more passes: 'kmax check' says what each "
-                                 "criterion would need")};
+                                 "no wall of 0.1 N/mm or more passes: 'kmax check' says what each criterion "
+                                 "would need")};
     return result;
   }
   result.checks = {judged.pass(fmt::format("{:.2f} N/mm, of {:.2f} N/mm asked for", stable * 1e-3,

@@ -14,8 +14,8 @@ constexpr std::array stages = {
     StageText{
         Stage::gate_drivers, "gate_drivers", "gate drivers, bridges and current sensors without a motor",
         "As before: nothing at M0, M1 and AUX.",
-        "Arms with 0 V, then gives pulses of a few milliseconds, of up to 40 % of the supply. No current "
-        "may flow. Asks you to press the emergency stop while 0 V are on."},
+        "Arms with 0 V, then gives pulses of a few milliseconds, of up to 40 % of the supply. No current may "
+        "flow. Asks you to press the emergency stop while 0 V are on."},
     StageText{
         Stage::load, "load", "current through all phases",
         "The motor, its shaft held fast (or three equal resistors of 1 to 10 ohm in a star): leads A, B, C; "

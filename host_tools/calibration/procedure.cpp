@@ -146,8 +146,9 @@ MotorKnowledge knowledge_of(Bench& bench, const CalibrationSettings& settings,
   known.mass = bench.number("device.mass");
   known.calibrated = bench.number("motor.calibrated") != 0.0;
   known.mass_known = known.calibrated;
-  known.searches_index = bench.number("encoder.index") != 0.0 && bench.number("encoder.start") == 0.0 &&
-                         bench.number("encoder.kind") == 0.0;
+  known.searches_index =
+      bench.number("encoder.index") != 0.0 && bench.number("encoder.start") == 0.0 &&
+      bench.number("encoder.kind") == static_cast<double>(firmware::EncoderKind::quadrature);
   known.current = std::min(settings.current.value_or(0.5 * known.current_limit), known.current_limit);
   return known;
 }

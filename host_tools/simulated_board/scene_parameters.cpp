@@ -92,7 +92,8 @@ std::vector<device::Assignment> hardware_assignments_of(const simulation::Scene&
     const bool brushed = std::holds_alternative<simulation::BrushedDcMotorConfig>(*named.motor);
     const bool serial = named.encoder.kind == simulation::EncoderKind::as5047p;
     all.push_back(hardware<"motor.kind">(axis, brushed ? 0 : 1));
-    all.push_back(hardware<"encoder.kind">(axis, serial ? 1 : 0));
+    all.push_back(hardware<"encoder.kind">(
+        axis, static_cast<int>(serial ? firmware::EncoderKind::as5047p : firmware::EncoderKind::quadrature)));
   }
   if (!scene.identified) return all;
   for (const device::Assignment& one : identified_assignments_of(scene)) all.push_back(one);

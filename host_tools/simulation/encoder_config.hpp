@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "firmware/object_dictionary/axis_groups.hpp"
 #include "host_tools/simulation/model_field.hpp"
 
 namespace kmax::simulation {
@@ -55,7 +56,7 @@ inline double count_length(double counts_per_turn, double transmission) {
   return two_pi * transmission / counts_per_turn;
 }
 
-enum class EncoderKind : std::uint8_t { quadrature, as5047p };
+using firmware::EncoderKind;
 
 // Default: 0.055 mm per count, the resolution of the Geomagic Touch (paper 1, section 4), and no defects.
 struct EncoderConfig {

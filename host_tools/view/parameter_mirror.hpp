@@ -17,7 +17,8 @@ class ParameterMirror {
   /// All of them. Errors as Device.
   void read_all(device::Device& device);
 
-  /// Reads some of those that are shown. True: something is not as it was.
+  /// Reads some of those that are shown or that the wall is judged by, all of them in turn. True: something
+  /// is not as it was.
   bool read_some(device::Device& device);
 
   /// They have been set.
@@ -34,7 +35,7 @@ class ParameterMirror {
  private:
   firmware::ParameterValues values_;
   std::optional<firmware::ParameterValues> found_;
-  std::size_t next_ = 0;  ///< in shown_parameters()
+  std::size_t next_ = 0;  ///< of those that read_some() reads
 };
 
 }  // namespace kmax::view

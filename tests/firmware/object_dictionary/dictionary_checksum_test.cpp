@@ -16,7 +16,7 @@ std::uint32_t fnv_1a(const std::vector<std::uint8_t>& bytes) {
 }
 
 // The host and the store compare it with what another build has made.
-TEST(DictionaryChecksum, IsFnv1aOfTheLittleEndianWordsOfEveryEntry) {
+TEST(DictionaryChecksum, IsFnv1aOfTheLittleEndianWordsOfAxesTickAndEveryEntry) {
   constexpr std::string_view vector = "foobar";
   ASSERT_EQ(fnv_1a({vector.begin(), vector.end()}), 0xBF9CF968U);
   std::vector<std::uint8_t> bytes;
@@ -27,6 +27,8 @@ TEST(DictionaryChecksum, IsFnv1aOfTheLittleEndianWordsOfEveryEntry) {
   const auto text = [&word](std::string_view characters) {
     for (const char c : characters) word(c);
   };
+  word(axis_count);
+  word(tick_rate_hz);
   for (std::size_t i = 0; i < entry_count; ++i) {
     const Entry& entry = entry_at(i);
     text(entry.name);

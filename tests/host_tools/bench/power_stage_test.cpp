@@ -8,37 +8,14 @@
 #include "board/odrive_v3/description.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/calibration/procedure.hpp"
-#include "host_tools/device/forwarding_link.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
+#include "tests/host_tools/renamed_board.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 
 namespace kmax::bench::power_stage_test {
 
+using host_tools_test::RenamedBoard;
 using host_tools_test::thrown_message;
-
-/// The native board under another name, or under none.
-class RenamedBoard : public device::ForwardingLink {
- public:
-  RenamedBoard(device::Link& beneath, std::optional<std::string> name)
-      : ForwardingLink(beneath), name_(std::move(name)) {}
-
-  std::map<std::string, std::string> identify() override {
-    auto texts = ForwardingLink::identify();
-    texts.erase("model_name");
-    if (name_) texts["model_name"] = *name_;
-    return texts;
-  }
-  void write(std::span<const device::SlotValue> values, device::Repeat repeat,
-             const std::function<void()>& before_request = {}) override {
-    written += values.size();
-    ForwardingLink::write(values, repeat, before_request);
-  }
-
-  std::size_t written = 0;
-
- private:
-  std::optional<std::string> name_;
-};
 
 struct Renamed {
   explicit Renamed(std::optional<std::string> name) {

@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <memory>
 #include <optional>
 
 #include "host_tools/base/errors.hpp"
 #include "tests/host_tools/bring_up/person_at_the_bench.hpp"
+#include "tests/host_tools/renamed_board.hpp"
 #include "tests/host_tools/selftest/tested_axis.hpp"
+#include "tests/host_tools/thrown_message.hpp"
 #include "tests/shared_beginning.hpp"
 
 namespace kmax::bring_up::bring_up_test {
@@ -31,6 +34,16 @@ struct StartedBoard {
   selftest::TestedAxis board;
   PersonAtTheBench person;
 };
+
+TEST(BringUp, OfABoardThatIsNotKnownDoesNotBegin) {
+  StartedBoard started("dc_coreless_a");
+  host_tools_test::RenamedBoard renamed(started.board.device->link(), "moteus_r4");
+  device::Device device(std::make_unique<host_tools_test::RenamedBoard>(renamed, "moteus_r4"));
+  PersonAtTheBench person(device, started.board.drives(), [](bool) {});
+  EXPECT_CONTAINS(host_tools_test::thrown_message<base::DeviceError>([&] { person.run(); }), "moteus_r4");
+  EXPECT_TRUE(person.asked.empty());
+  EXPECT_EQ(renamed.written, 0U);
+}
 
 TEST(BringUp, ABlankBoardComesToItsFirstWalls) {
   for (const char* scene : {"dc_coreless_a", "gimbal_b"}) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/check/judgement.hpp"
 #include "host_tools/view/device_session.hpp"
 #include "tests/host_tools/thrown_message.hpp"
 #include "tests/host_tools/view/watched_conversation.hpp"
@@ -60,6 +61,26 @@ TEST_F(ConversationTest, WhatAnotherProgramSetsIsSeen) {
   const device::SlotValue value{Parameter::of<"wall.damping">(1).slot(), std::bit_cast<std::uint32_t>(2.5F)};
   watched.device.write({&value, 1}, device::Repeat::never);
   until(talk, "parameters", [](const Json& m) { return m["values"]["axis1.wall.damping"]["value"] == 2.5; });
+}
+
+TEST_F(ConversationTest, WhatAnotherProgramSetsOfTheWallsVerdictIsSeen) {
+  Conversation talk(reach, commands, analysis, mirror, publish);
+  std::size_t seen = 0;
+  for (const Parameter& judged : check::parameters_of_case(1)) {
+    const auto before = mirror.values().raw(judged.slot());
+    if (judged.definition().type != firmware::Type::float32) continue;
+    const float value = std::bit_cast<float>(before) * 0.5F + 0.001F;
+    const device::SlotValue half{judged.slot(), std::bit_cast<std::uint32_t>(value)};
+    try {
+      watched.device.write({&half, 1}, device::Repeat::never);
+    } catch (const device::RefusedError&) {
+      continue;  // by a rule between parameters
+    }
+    for (int step = 0; step < 2000 && mirror.values().raw(judged.slot()) == before; ++step) talk.step();
+    EXPECT_EQ(mirror.values().raw(judged.slot()), half.raw) << judged.name();
+    ++seen;
+  }
+  EXPECT_GE(seen, 8U);
 }
 
 // Whatever is going on: one request may be on its way when the stop comes, and the next one is the stop.

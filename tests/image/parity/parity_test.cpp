@@ -6,6 +6,7 @@
 #include <random>
 
 #include "board/odrive_v3/description.hpp"
+#include "host_tools/device/parameter.hpp"
 #include "tests/image/parity/axis_tick_calls.hpp"
 
 namespace kmax::tests::parity_test {
@@ -130,6 +131,11 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
     master.write_holding(address,
                          std::array{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw)});
   };
+  const auto any_choice = [&world](const char* name) {
+    const auto& choices = device::resolve(name).definition().values;
+    return static_cast<std::uint32_t>(
+        choices[static_cast<std::size_t>(world.uniform(0, static_cast<double>(choices.size())))].value);
+  };
   const auto real = [](double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); };
   board.run_for(0.3);
   while (companion.ticks < 1'000'000) {
@@ -138,25 +144,25 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       write("drive.controlword", axis, 0x80);
     }
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      write("wall.law", axis, static_cast<std::uint32_t>(world.uniform(0, 4)));
+      write("wall.law", axis, any_choice("wall.law"));
       write("wall.side", axis, world.uniform(0, 1) < 0.5 ? 0xFFFFu : 1u);
       write("wall.stiffness", axis, real(world.uniform(0, 20000)));
       write("wall.damping", axis, real(world.uniform(0, 20)));
       write("wall.damping_window", axis, static_cast<std::uint32_t>(world.uniform(0, 17)));
       write("wall.touch_stiffness", axis, real(std::max(0.0, world.uniform(-5000, 5000))));
       write("wall.growth_time", axis, real(world.uniform(0.001, 0.3)));
-      write("wall.adaptive_mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write("wall.adaptive_relation", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write("interference.mode", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
+      write("wall.adaptive_mode", axis, any_choice("wall.adaptive_mode"));
+      write("wall.adaptive_relation", axis, any_choice("wall.adaptive_relation"));
+      write("interference.mode", axis, any_choice("interference.mode"));
       write("interference.force", axis, real(world.uniform(-1, 5)));
       write("interference.background_force", axis, real(world.uniform(-1, 4)));
       write("interference.onset_time", axis, real(world.uniform(0, 0.002)));
-      write("velocity.estimator", axis, static_cast<std::uint32_t>(world.uniform(0, 6)));
+      write("velocity.estimator", axis, any_choice("velocity.estimator"));
       write("velocity.window", axis, static_cast<std::uint32_t>(world.uniform(1, 17)));
       write("velocity.limit", axis, real(0.0));
       write("position.resolution", axis, real(world.uniform(0, 2e-4)));
-      write("position.rounding", axis, static_cast<std::uint32_t>(world.uniform(0, 3)));
-      write("motor.kind", axis, static_cast<std::uint32_t>(world.uniform(0, 2)));
+      write("position.rounding", axis, any_choice("position.rounding"));
+      write("motor.kind", axis, any_choice("motor.kind"));
       write("motor.commutation_known", axis, 1);
       write("compensation.dead_time", axis, real(world.uniform(-1, 1) < 0 ? 0.0 : 2e-7));
       write("guard.friction", axis, real(1.0));
@@ -168,7 +174,7 @@ TEST(Parity, OneMillionRandomTicksAreBitIdentical) {
       write("device.hand_force", axis, real(world.uniform(0, 1) < 0.1 ? 5.0 : 1000.0));
       const double mode = world.uniform(0, 1);
       write("drive.mode", axis, mode < 0.25 ? 1 : mode < 0.5 ? 2 : 0);
-      write("excitation.kind", axis, static_cast<std::uint32_t>(world.uniform(0, 5)));
+      write("excitation.kind", axis, any_choice("excitation.kind"));
       write("excitation.bias", axis, real(world.uniform(-5, 5)));
       write("excitation.alternation", axis, real(world.uniform(-5, 5)));
       write("excitation.half_period", axis, static_cast<std::uint32_t>(world.uniform(0, 40)));

@@ -378,8 +378,8 @@ def check(parameters: Mapping[str, Setting] | None = None, *, hand: str = "none"
 
 
 def experiment(name: str, **options: Any) -> dict[str, Any]:
-    """An experiment of the papers on simulated people: max-stiffness, contact, jitter, deviation, resolution. The command
-    line's options with underscores: experiment("jitter", touches=3)."""
+    """An experiment of the papers on simulated people, as 'kmax experiment' names them. The command line's
+    options with underscores: experiment("jitter", touches=3)."""
     return _experiment(run, name, options)
 
 
