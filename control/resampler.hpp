@@ -9,15 +9,13 @@ namespace kmax::control {
 
 // Which multiple of the step stands for a count.
 //   nearest     the nearest one; a tie (only possible with an even step) goes to the larger one, for negative
-//   counts
-//               too. Every cell is therefore exactly `step` counts wide, the one around zero included:
+//               counts too. Every cell is therefore exactly `step` counts wide, the one around zero included:
 //               step 4 maps -2..1 to 0; step 5 maps -2..2 to 0. Error: -step/2 < output - count <= step/2.
 //   floor       the largest one that is not above the count: step 4 maps -4..-1 to -4. What a coarser encoder
-//   does.
-//               Error: -step < output - count <= 0.
+//               does. Error: -step < output - count <= 0.
 //   hysteresis  the output is kept until the count has left it by a full step, then it moves to the nearest
-//   one. A
-//               count that dithers by less than a step never toggles the output. Error: less than a step.
+//               one. A count that dithers by less than a step never toggles the output. Error: less than a
+//               step.
 enum class Rounding : std::uint8_t { nearest = 0, floor = 1, hysteresis = 2 };
 
 struct ResamplerConfig {

@@ -8,9 +8,8 @@
 // Who may interrupt whom, for the whole board: 0 is the most urgent, 15 the least.
 //
 //   0  lines     nFAULT and emergency stop: clear MOE of both bridges and leave a flag, or set it again if it
-//   was
-//                interference. They may interrupt a tick; if that tick is just about to set MOE, it sees the
-//                flag and clears MOE again
+//                was interference. They may interrupt a tick; if that tick is just about to set MOE, it sees
+//                the flag and clears MOE again
 //   1  tick      the conversions' end: the control of one axis, 40,000 times a second
 //   4  clock     SysTick at 1 kHz, the microsecond clock and the main loop's heartbeat
 //   8  serial    one byte in, one byte out; CAN: one frame in, the next ones out; USB: packets either way

@@ -12,7 +12,7 @@ namespace kmax::board {
 /// - a stack that overflows: it grows towards the bottom of its memory. The bus has nothing below either, but
 ///   its error would come some instructions after a store, and without an address
 /// - a null pointer, as far as 16 KiB from it: SRAM is at address 0, where the bus would let it load and
-/// store
+///   store
 /// - code anywhere but in flash and where the tick's is, and stores to either outside the parameter sectors
 inline constexpr auto memory_rights = std::to_array<drivers::cortex_m::ProtectedRegion>({
     {0x0800'0000, 20, drivers::cortex_m::MemoryRights::read_execute, drivers::cortex_m::MemoryKind::flash},

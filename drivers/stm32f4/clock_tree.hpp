@@ -11,8 +11,7 @@
 //
 //   8 MHz crystal -> PLL -> 168 MHz     what the board is built for
 //   16 MHz RC     -> PLL -> 168 MHz     crystal or PLL input dead: same speed, but the RC oscillator is only
-//   within about
-//                                       1 %: good enough for a USART, not for CAN
+//                                       within about 1 %: good enough for a USART, not for CAN
 //   16 MHz RC                           PLL dead: the link still answers, the haptic rate cannot be kept
 //
 // Sequence as in RM0090 (RCC, PWR, FLASH chapters): voltage scale 1, oscillator, flash wait states read back,

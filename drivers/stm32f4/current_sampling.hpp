@@ -30,13 +30,11 @@
 //
 // What is checked on every read, and counted:
 //   axis_mismatches   the lists in force were not those of the axis that the caller names (it takes the axis
-//   from the
-//                     timer's direction): the sample is not valid. The lists are set for the next trigger by
-//                     the caller's axis, so one good interrupt is enough to be in step again.
+//                     from the timer's direction): the sample is not valid. The lists are set for the next
+//                     trigger by the caller's axis, so one good interrupt is enough to be in step again.
 //   overruns          a trigger fell between the reading and the writing of the lists (flags up again), or
-//   the same
-//                     axis came twice in a row: the other's sample was lost. An even number of lost triggers
-//                     looks like none: flags hold one bit. The caller sees that by its clock.
+//                     the same axis came twice in a row: the other's sample was lost. An even number of lost
+//                     triggers looks like none: flags hold one bit. The caller sees that by its clock.
 //   missing_phase_c   ADC2 was done, ADC3 not.
 //   spurious          called without a finished conversion; nothing was touched.
 // A lost interrupt counts as overrun and mismatch. A mismatch alone means that caller and trigger disagree on

@@ -8,20 +8,18 @@
 //   used. read_input(address, out)     the same for input registers. write_holding(address, in)   whole or
 //   nothing: writes every register and returns none, or changes nothing and
 //                                returns illegal_data_address   a register is missing or read-only, or the
-//                                range cuts a
-//                                                               value of several registers in two,
+//                                                               range cuts a value of several registers in
+//                                                               two,
 //                                        illegal_data_value     a value is out of its range,
 //                                        server_device_failure, server_device_busy,
 //                                        negative_acknowledge   the device is locked (Modicon's PI-MBUS-300
 //                                                               has it for a programming request refused).
 //   has_holding(address, count)  true if read_holding() over this range returns none. Read/write-multiple
-//   asks before it
-//                                writes, since an exception for the read part must leave the registers
-//                                untouched.
+//                                asks before it writes, since an exception for the read part must leave the
+//                                registers untouched.
 //   identification(object_id)    text of a device identification object, empty if there is none. 0 vendor, 1
-//   product
-//                                code, 2 revision are mandatory; 3..0x7F printable ASCII as well, 0x80..0xFF
-//                                free. At most 244 bytes are sent.
+//                                product code, 2 revision are mandatory; 3..0x7F printable ASCII as well,
+//                                0x80..0xFF free. At most 244 bytes are sent.
 #pragma once
 
 #include <concepts>

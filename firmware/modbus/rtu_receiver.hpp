@@ -19,11 +19,9 @@
 //
 // Time: microseconds, wraps at 2^32. The caller
 //   - calls poll() at least once a second (a silence is recognised once and then no longer measured, so the
-//   line may
-//     stay idle for ever);
+//     line may stay idle for ever);
 //   - hands over all characters that ended up to `now` before it calls poll(now): read the clock first, then
-//   empty the
-//     character queue, then poll. Characters with later times may have been handed over too.
+//     empty the character queue, then poll. Characters with later times may have been handed over too.
 // Resolution: rounding of the limits and of the time stamps adds up to 3 us; silences closer than that to a
 // limit may be judged either way.
 //

@@ -25,12 +25,11 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
                   "start, while another axis' did; declared: drive.declared_absent is yes."),
     reading(
         "drive.gate_driver_faults", group::drive_status, 7, unsigned16, "",
-        "What the axis' gate driver said when the drivers' common fault line last fell, a bit each: too "
-        "much current in the low side of phase C (1) and in its high side (2), in those of phase B (4 and "
-        "8) and of phase A (16 and 32), over-temperature warning (64) and shut-down (128), motor supply too "
-        "low (256), gate supply "
-        "too low (512) and too high (2048), no answer (4096). 0: nothing; it was another axis' driver, or "
-        "interference on the line."),
+        "What the axis' gate driver said when the drivers' common fault line last fell, a bit each: too much "
+        "current in the low side of phase C (1) and in its high side (2), in those of phase B (4 and 8) and "
+        "of phase A (16 and 32), over-temperature warning (64) and shut-down (128), motor supply too low "
+        "(256), gate supply too low (512) and too high (2048), no answer (4096). 0: nothing; it was another "
+        "axis' driver, or interference on the line."),
 
     reading("measured.tick", group::measured, 1, unsigned32, "ticks",
             "Tick at which these values were taken."),
@@ -113,8 +112,7 @@ inline constexpr std::array axis_readings = std::to_array<Entry>({
         "profile.digital_inputs", group::profile_actual, 9, unsigned32, "",
         "CiA 402 digital inputs. Bit 16: the emergency stop is pressed or its line open; 17: the gate driver "
         "pulled its fault line and is not reset yet (not seen while bit 16 is set); 18: the encoder's index "
-        "has been passed since "
-        "the start. There are no limit or home switches.")
+        "has been passed since the start. There are no limit or home switches.")
         .at_standard_index(0x60FD),
 
     reading("telemetry.current", group::telemetry, 1, integer16, "mA",

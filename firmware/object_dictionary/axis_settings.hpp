@@ -129,8 +129,7 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
         .only_higher(),
     real("force.ceiling", group::force, 4, "N", 0, 1000, 0,
          "How far force.limit, and what acts without a push of the hand (field, interference, background), "
-         "may "
-         "be raised while the axis is armed; 0: they can only be lowered.")
+         "may be raised while the axis is armed; 0: they can only be lowered.")
         .disarmed_only(),
 
     choice("guard.mode", group::guard, 1, names::guard_mode, 0,

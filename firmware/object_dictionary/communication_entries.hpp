@@ -178,8 +178,7 @@ inline constexpr std::array node_entries = std::to_array<Entry>({
     communication(
         "sdo_server_2.request_cob_id", group::sdo_server_2, 1, Type::unsigned32, "", 4294967295.0,
         canopen::cob_id::invalid,
-        "Identifier by which a second host asks; bit 31, here or in the answer's: there is no second "
-        "server.")
+        "Identifier by which a second host asks; bit 31, here or in the answer's: there is no second server.")
         .disarmed_only(),
     communication("sdo_server_2.response_cob_id", group::sdo_server_2, 2, Type::unsigned32, "", 4294967295.0,
                   canopen::cob_id::invalid, "Identifier of the answers to it.")

@@ -227,8 +227,7 @@ std::string_view to_string(BackEmfCause cause) {
       return "back-EMF: the shaft hardly moves; more current, a longer half period, or free the handle";
     case BackEmfCause::no_voltage:
       return "back-EMF: the shaft turns and no voltage is induced; the encoder is not on this motor's shaft, "
-             "or a "
-             "phase is open";
+             "or a phase is open";
     case BackEmfCause::reversed:
       return "back-EMF: the induced voltage has the wrong sign; encoder.direction is wrong, or two wires are "
              "swapped";

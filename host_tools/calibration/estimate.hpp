@@ -11,9 +11,9 @@
 namespace kmax::calibration {
 
 // standard_error is one standard deviation of the value under the fit's own assumptions (its header names
-// them): 68 of 100 repetitions lie within it, 95 within twice that. It covers random errors
-// only; what the model leaves out (a magnetic saturation, say) is not in it, the residual of the fit shows
-// that. A value with an infinite standard error is not known.
+// them): 68 of 100 repetitions lie within it, 95 within twice that. It covers random errors only; what the
+// model leaves out (a magnetic saturation, say) is not in it, the residual of the fit shows that. A value
+// with an infinite standard error is not known.
 struct Estimate {
   double value = 0.0;
   double standard_error = std::numeric_limits<double>::infinity();

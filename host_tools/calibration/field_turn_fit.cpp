@@ -211,24 +211,19 @@ std::string_view to_string(FieldTurnCause cause) {
       return "field turn: the commanded angle does not turn forwards and back; look at excitation.angle_rate";
     case FieldTurnCause::motor_still:
       return "field turn: the field turns and the encoder does not count; the motor is blocked, a phase is "
-             "open, or "
-             "the encoder is dead";
+             "open, or the encoder is dead";
     case FieldTurnCause::not_whole:
       return "field turn: the number of pole pairs is not whole; encoder.counts_per_turn is wrong, or counts "
-             "are "
-             "lost";
+             "are lost";
     case FieldTurnCause::slipping:
       return "field turn: the counts per electrical turn are not always the same; the rotor slips (more "
-             "current), "
-             "the encoder slips on the shaft, or counts are lost";
+             "current), the encoder slips on the shaft, or counts are lost";
     case FieldTurnCause::not_meeting:
       return "field turn: the forward and the backward sweep do not meet; friction is too much for the "
-             "current, or "
-             "something slipped";
+             "current, or something slipped";
     case FieldTurnCause::direction_differs:
       return "field turn: the shaft did not follow the field's reversal; a phase is open, or the encoder's "
-             "lines "
-             "are mixed up";
+             "lines are mixed up";
     case FieldTurnCause::pole_pairs_differ:
       return "field turn: motor.pole_pairs is not what the motor has";
   }

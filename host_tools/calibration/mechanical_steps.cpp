@@ -90,8 +90,8 @@ void find_torque_constant(Calibration& run) {
          fmt::format("the torque constant is {:.3g} N m/A and was {:.3g} N m/A when this motor was last "
                      "calibrated: the encoder loses a share of the travel",
                      value.value, before),
-         "tighten the encoder's hub; after an exchange of motor or encoder: 'kmax set "
-         "motor.calibrated=no', and calibrate again"});
+         "tighten the encoder's hub; after an exchange of motor or encoder: 'kmax set motor.calibrated=no', "
+         "and calibrate again"});
   known.torque_constant = value.value;
   bench.set_result({fmt::format("motor.torque_constant={:.9g}", value.value)});
 }

@@ -23,8 +23,8 @@ struct InducedVoltage {
 // From channels `voltage` and `current` (A, along the torque) while the current is a square wave: each half
 // wave's rise of voltage - resistance x current from its third to its sixth tenth to the last three; with a
 // channel `voltage_d` the rise of the vector. `half_period` in samples, the record begins with a half wave;
-// `first` and `end` bound the samples that count. Fewer than 10 samples in half a wave, or
-// half waves of less than 3.5 ms, in which the current controller is still at work: 0 with an infinite error.
+// `first` and `end` bound the samples that count. Fewer than 10 samples in half a wave, or half waves of less
+// than 3.5 ms, in which the current controller is still at work: 0 with an infinite error.
 InducedVoltage induced_in_waves(const Waveforms& seen, const MotorKnowledge& known, std::size_t half_period,
                                 std::size_t first, std::size_t end);
 

@@ -344,8 +344,7 @@ std::string_view to_string(WindingCause cause) {
       return "winding: the voltage does not change; set excitation.alternation";
     case WindingCause::supply_saturated:
       return "winding: the voltage asked for is more than the supply can give; lower the voltage or raise "
-             "the "
-             "supply";
+             "the supply";
     case WindingCause::no_current:
       return "winding: no current follows the voltage; a phase is open, or the bridge is off";
     case WindingCause::current_constant:
@@ -357,8 +356,7 @@ std::string_view to_string(WindingCause cause) {
              "samples";
     case WindingCause::bad_fit:
       return "winding: the current does not behave as R and L in series; look at the capture (motion, "
-             "saturation, a "
-             "loose wire)";
+             "saturation, a loose wire)";
   }
   return {};
 }

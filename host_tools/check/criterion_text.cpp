@@ -48,9 +48,8 @@ constexpr std::array<CriterionText, control::criterion_count> texts{{
      "A spring wall without delay on a mass with Coulomb and viscous friction whose encoder has this "
      "quantum; any hand. Necessary and sufficient for passivity of that wall without B. A damper by "
      "difference or low_pass adds up to |B| quantum / T to the step of the force, which friction must hold "
-     "too (own derivation). 2 b / T knows neither T_d nor B, and no device is "
-     "without T_d: by itself it guarantees nothing. A guarantee needs colgate, which has the delay, and from "
-     "here the step.",
+     "too (own derivation). 2 b / T knows neither T_d nor B, and no device is without T_d: by itself it "
+     "guarantees nothing. A guarantee needs colgate, which has the delay, and from here the step.",
      "",
      "J. J. Abbott and A. M. Okamura, Effects of position quantization and sampling rate on virtual-wall "
      "passivity, IEEE Trans. Robotics 21(5), 2005.",

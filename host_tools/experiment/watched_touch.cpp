@@ -286,10 +286,8 @@ void require_sound(const TouchWatch& watch) {
     return;
   throw std::invalid_argument(
       fmt::format("a touch held for {} s, waited for {} s, traced {} times a second and for {} s after the "
-                  "hold, ended by "
-                  "{} m, or {} m of the wall, within {} s: all must be finite, the amplitudes and the time "
-                  "after the hold "
-                  "0 or above, the others above 0",
+                  "hold, ended by {} m, or {} m of the wall, within {} s: all must be finite, the amplitudes "
+                  "and the time after the hold 0 or above, the others above 0",
                   watch.hold_time, watch.contact_patience, watch.trace_rate, watch.release,
                   watch.abort_amplitude, watch.wall_abort_amplitude, watch.abort_window));
 }

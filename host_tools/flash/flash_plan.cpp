@@ -63,10 +63,8 @@ std::vector<Step> openocd_start(Method method, const FlashTarget& target) {
 /// next reset on.
 constexpr const char* set_brown_out_level =
     "set options [read_memory 0x40023c14 32 1]; if {$options & 0xc} {mww 0x40023c08 0x08192a3b; mww "
-    "0x40023c08 "
-    "0x4c5d6e7f; mww 0x40023c14 [expr {$options & ~0xf}]; mww 0x40023c14 [expr {($options & ~0xf) | 2}]; "
-    "sleep "
-    "500; mww 0x40023c14 [expr {($options & ~0xf) | 1}]}";
+    "0x40023c08 0x4c5d6e7f; mww 0x40023c14 [expr {$options & ~0xf}]; mww 0x40023c14 [expr {($options & ~0xf) "
+    "| 2}]; sleep 500; mww 0x40023c14 [expr {($options & ~0xf) | 1}]}";
 
 FlashPlan openocd_plan(Method method, const FlashImage& image, const FlashTarget& target) {
   Arguments write = openocd_adapter(method, target);

@@ -188,10 +188,10 @@ device::Device Context::connect() {
 device::Device Context::connect_to_change() {
   if (!named_device())
     throw UsageError(fmt::format(
-        "this changes a device, and none is named: give --device serial:PATH, can:IFACE or usb, "
-        "set KMAX_DEVICE, or write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be "
-        "reached. 'kmax serve --serial /tmp/kmax' is a simulated one that lasts, --device sim one that is "
-        "gone when the command ends",
+        "this changes a device, and none is named: give --device serial:PATH, can:IFACE or usb, set "
+        "KMAX_DEVICE, or write device = \"serial:PATH\" into {}; 'kmax devices' shows what can be reached. "
+        "'kmax serve --serial /tmp/kmax' is a simulated one that lasts, --device sim one that is gone when "
+        "the command ends",
         device::settings_file().string()));
   return connect();
 }

@@ -37,8 +37,7 @@ class Context {
   Context(std::ostream& out_stream, std::ostream& messages, Opener opener)
       : out(out_stream), messages_(messages), opener_(std::move(opener)) {}
 
-  /// Opens the named device, or the simulated one, and checks that it is a Kmax
-  /// device of this release.
+  /// Opens the named device, or the simulated one, and checks that it is a Kmax device of this release.
   device::Device connect();
   /// The same for a command that changes the device. UsageError where none is named: the simulated one lives
   /// for that command only and keeps nothing of it.

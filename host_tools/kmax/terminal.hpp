@@ -20,8 +20,7 @@ class TerminalPrompter final : public bench::Prompter {
   TerminalPrompter(Context& context, std::function<void()> check, std::string advice)
       : context_(context), check_(std::move(check)), advice_(std::move(advice)) {}
 
-  /// Throws bench::Interrupted when standard input ends or is closed: nobody is there to
-  /// answer.
+  /// Throws bench::Interrupted when standard input ends or is closed: nobody is there to answer.
   void ask(const std::string& what_to_do) override;
 
  private:

@@ -193,8 +193,8 @@ class Loop {
     if (watchdog_ != nullptr) watchdog_->end();
     if (watchdog_ != nullptr && watchdog_->tripped())
       throw WatchdogError(fmt::format(
-          "the loop's function took longer than {} s, so that the axis was disarmed; make it faster, "
-          "or allow it more time (watchdog)",
+          "the loop's function took longer than {} s, so that the axis was disarmed; make it faster, or "
+          "allow it more time (watchdog)",
           options_.watchdog));
     if (!force) return false;
     if (!std::isfinite(*force))
@@ -240,8 +240,7 @@ class Loop {
     const device::DriveStatus status = Drive(session_.device, options_.axis).status();
     throw device::LinkError(
         fmt::format("{}: no complete answer to SYNC for 1 s while axis {} is in '{}': is the bus too busy, "
-                    "or was the node "
-                    "taken out of the state operational?",
+                    "or was the node taken out of the state operational?",
                     device::text_of(session_.address), options_.axis, device::to_string(status.state())));
   }
 

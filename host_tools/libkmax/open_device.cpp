@@ -22,8 +22,7 @@ void OpenDevice::close() {
   if (std::ranges::find(callers_, std::this_thread::get_id()) != callers_.end())
     throw Error(
         "a device cannot be closed from within one of its own calls; let the function end that call, and "
-        "close "
-        "it then");
+        "close it then");
   closing_ = true;
   session_->link().end();
   const auto poll = session_->options.poll;

@@ -13,8 +13,8 @@
 namespace kmax::library {
 
 /// While one exists, waiting in this thread does not ask whether it should end, and reading does not lend the
-/// link first: what takes the force away is
-/// not to be interrupted, and a thread of the library's own must not need what its user's threads hold.
+/// link first: what takes the force away is not to be interrupted, and a thread of the library's own must not
+/// need what its user's threads hold.
 class Uninterrupted {
  public:
   Uninterrupted() { ++depth(); }

@@ -75,11 +75,10 @@ std::string markdown(const Page& page);
 /// `text` so that Markdown shows it as it is, in a table's cell too: a line's end becomes <br>.
 std::string markdown_escaped(const std::string& text);
 
-/// The table in columns two spaces apart, numbers with a straight right edge, the
-/// headings over a line, the caption before them. No space at the end of a line. A control character in a
-/// cell (a line's end, an escape sequence) becomes a space. A table without columns is its caption alone.
-/// `width` columns, if it is not 0, are not exceeded as long as words fit: headings and texts go on in
-/// further lines, numbers never.
+/// The table in columns two spaces apart, numbers with a straight right edge, the headings over a line, the
+/// caption before them. No space at the end of a line. A control character in a cell (a line's end, an escape
+/// sequence) becomes a space. A table without columns is its caption alone. `width` columns, if it is not 0,
+/// are not exceeded as long as words fit: headings and texts go on in further lines, numbers never.
 std::string terminal_text(const Table& table, std::size_t width = 0);
 
 /// The file's name alone as a relative reference (RFC 3986): every byte but letters, digits, '-', '.', '_'

@@ -183,8 +183,7 @@ CheckResult check_gate_driver(const Evidence& evidence) {
               "motor unplugged; if the fault stays, the driver or a transistor is broken"
             : "the power stage does not become ready although the supply is there: a gate driver does not "
               "answer or does not keep its settings. Let the motor stand, which keeps it from starting while "
-              "it is turned "
-              "fast; switch the board off and on, then replace it");
+              "it is turned fast; switch the board off and on, then replace it");
   }
   if (!arming.armed) return result.not_judged(fmt::format("the axis cannot be armed: {}", arming.words()));
   return result.pass("ready, no fault, before and during the pulses");

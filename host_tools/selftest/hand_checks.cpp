@@ -35,8 +35,8 @@ CheckResult check_hand_motion(Probe& probe, const HandSettings& settings, const 
   return result.fail(
       "encoder",
       fmt::format(
-          "{}; {:.0f} mm were asked for within {:.0f} s: if the handle was moved, check the encoder's "
-          "plug, cable, disc and hub, and encoder.counts_per_turn",
+          "{}; {:.0f} mm were asked for within {:.0f} s: if the handle was moved, check the encoder's plug, "
+          "cable, disc and hub, and encoder.counts_per_turn",
           counted, settings.travel * 1e3, settings.patience));
 }
 

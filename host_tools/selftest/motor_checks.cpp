@@ -35,9 +35,9 @@ CheckResult check_handle(const Evidence& evidence) {
   return result.fail(
       "handle",
       fmt::format(
-          "{}{}; {}: something else moved the handle; let go of it, see that nothing pulls at it, and "
-          "start again. If nobody touched it, the encoder counts what is not there, or the motor is "
-          "far stronger or the handle far lighter than motor.torque_constant and device.mass say",
+          "{}{}; {}: something else moved the handle; let go of it, see that nothing pulls at it, and start "
+          "again. If nobody touched it, the encoder counts what is not there, or the motor is far stronger "
+          "or the handle far lighter than motor.torque_constant and device.mass say",
           seen, how, allowed));
 }
 
@@ -251,8 +251,8 @@ CheckResult check_encoder(const Evidence& evidence) {
       return result.fail(
           "encoder",
           at_rest +
-              " from one tick to the next; allowed is 5: check its cable, shield and supply, and the "
-              "magnet of a magnetic one");
+              " from one tick to the next; allowed is 5: check its cable, shield and supply, and the magnet "
+              "of a magnetic one");
   }
   if (!evidence.motion) {
     std::string reason = reason_without_pulses(evidence);
@@ -277,8 +277,8 @@ CheckResult check_encoder(const Evidence& evidence) {
       return result.fail(
           "encoder",
           seen +
-              ": the motor turns and the encoder does not see it: check its plug and cable, and whether "
-              "its disc, magnet or hub is loose");
+              ": the motor turns and the encoder does not see it: check its plug and cable, and whether its "
+              "disc, magnet or hub is loose");
     if (motion.back_emf_would_show())
       return result.fail(
           "handle (blocked or held)",
@@ -288,8 +288,8 @@ CheckResult check_encoder(const Evidence& evidence) {
     return result.fail(
         "encoder or handle (no motion seen)",
         seen +
-            ": no motion was seen, and the motor's back-EMF is too small here to tell a dead encoder from "
-            "a blocked handle; move the handle by hand with 'kmax selftest --hand'");
+            ": no motion was seen, and the motor's back-EMF is too small here to tell a dead encoder from a "
+            "blocked handle; move the handle by hand with 'kmax selftest --hand'");
   }
   if (!facts.calibrated)
     return result.pass(seen + ": it moves; its direction and scale are for 'kmax calibrate' to find");
@@ -315,8 +315,8 @@ CheckResult check_encoder(const Evidence& evidence) {
   if (!facts.commutation_known)
     return result.pass(
         seen +
-        "; whether its direction fits the phases is not judged, since the commutation is not known "
-        "since the last start");
+        "; whether its direction fits the phases is not judged, since the commutation is not known since the "
+        "last start");
   const double error = commutation_error(evidence);
   constexpr double allowed_error = allowed_degrees * std::numbers::pi / 180.0;
   result.values.push_back({"commutation_error", error, "rad", -allowed_error, allowed_error});
@@ -325,16 +325,16 @@ CheckResult check_encoder(const Evidence& evidence) {
     return result.fail(
         "direction of the encoder",
         fmt::format(
-            "{}, but against the force (the commutation is off by {:.0f} degrees): the encoder's lines "
-            "A and B are exchanged, or encoder.direction is wrong: run 'kmax calibrate'",
+            "{}, but against the force (the commutation is off by {:.0f} degrees): the encoder's lines A and "
+            "B are exchanged, or encoder.direction is wrong: run 'kmax calibrate'",
             seen, degrees));
   if (degrees > allowed_degrees)
     return result.fail(
         "order of the phases or motor.electrical_offset",
         fmt::format(
-            "{}, but the rotor stands {:.0f} electrical degrees from where the commutation takes it to "
-            "be; allowed are {:.0f}: two phases are exchanged, or the encoder has moved on the shaft: run "
-            "'kmax calibrate'",
+            "{}, but the rotor stands {:.0f} electrical degrees from where the commutation takes it to be; "
+            "allowed are {:.0f}: two phases are exchanged, or the encoder has moved on the shaft: run 'kmax "
+            "calibrate'",
             seen, degrees, allowed_degrees));
   return result.pass(
       fmt::format("{}; the commutation is off by {:.0f} electrical degrees, allowed are {:.0f}", seen,

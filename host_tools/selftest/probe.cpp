@@ -56,8 +56,7 @@ Restored Probe::restore() {
         restored.in_order
             ? "every parameter is as it was"
             : "drive.mode, excitation.*, capture.* and link.timeout may still be as the test has "
-              "set them; nothing of it was saved: switch the device off and on, or set them by "
-              "'kmax set'";
+              "set them; nothing of it was saved: switch the device off and on, or set them by 'kmax set'";
     // Said here: no second attempt by the destructor.
     bench_.journal().forget();
   }
@@ -223,8 +222,8 @@ PulseResponse Probe::give(const Pulse& pulse, Observe observe) {
     bench_.progress(fmt::format("a pulse of {:.2f} V", pulse.voltage));
     if (const double moved = displacement(); std::abs(moved) > farthest_start)
       throw HandleMoved(fmt::format(
-          "the handle stands {:.2f} mm from where it was at the start, and the test has not moved "
-          "it that far",
+          "the handle stands {:.2f} mm from where it was at the start, and the test has not moved it that "
+          "far",
           moved * 1e3));
     return bench_.record_alone(excitation, plan);
   }));

@@ -27,8 +27,8 @@ void Pace::watch(Time real, Time given_up) {
   watched_ = given_up_meanwhile_ = {};
   if (share >= slow) return;
   std::exchange(say_, nullptr)(fmt::format(
-      "this machine is too slow or busy: over the last 5 s the simulation ran at {:.0f} % of real "
-      "time, so a second of it takes {:.1f} s. Waits take that much longer, and links may report errors",
+      "this machine is too slow or busy: over the last 5 s the simulation ran at {:.0f} % of real time, so a "
+      "second of it takes {:.1f} s. Waits take that much longer, and links may report errors",
       100.0 * share, 1.0 / share));
 }
 

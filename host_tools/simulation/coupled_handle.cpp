@@ -33,8 +33,8 @@ void require_start(const HandleStart& start) {
 
 [[noreturn]] void refuse(double force, double background_force, double duration) {
   throw std::invalid_argument(fmt::format(
-      "advance(force = {} N, background force = {} N, duration = {} s): forces must be finite (background "
-      "at most 1e6 N), the duration in (0, 10] s",
+      "advance(force = {} N, background force = {} N, duration = {} s): forces must be finite (background at "
+      "most 1e6 N), the duration in (0, 10] s",
       force, background_force, duration));
 }
 

@@ -50,8 +50,8 @@
 
 namespace kmax::simulation {
 
-// Where the handle is at time 0, and how fast; a tip moves with it; the hand starts at the
-// same place, at rest.
+// Where the handle is at time 0, and how fast; a tip moves with it; the hand starts at the same place, at
+// rest.
 struct HandleStart {
   double position = 0.0;  // m
   double velocity = 0.0;  // m/s

@@ -9,11 +9,11 @@
 namespace kmax::simulation {
 namespace {
 
-constexpr double diode_step = 12.5e-6;  // s
-constexpr double band_share = 0.5;      // of a PWM period; the band's time constant is a whole one
-constexpr double fine_turn = 0.1;       // rad of the electrical angle in a fine step
-constexpr double no_current = 1e-9;     // A; what a diode does not notice
-constexpr int bisections = 30;          // 2^-30 = 1e-9
+constexpr double diode_step = 12.5e-6;           // s
+constexpr double band_share = 0.5;               // of a PWM period; the band's time constant is a whole one
+constexpr double fine_turn = 0.1;                // rad of the electrical angle in a fine step
+constexpr double no_current = 1e-9;              // A; what a diode does not notice
+constexpr int bisections = 30;                   // 2^-30 = 1e-9
 constexpr int most_inverter_steps = 10'000'000;  // per call; more is a defect of this file
 
 enum class Path : unsigned char { absent, blocked, leg, lower_diode, upper_diode };
@@ -291,8 +291,8 @@ Inverter::Flow Inverter::advance(Motor& motor, const InverterCommand& command, d
   if (!(supply >= 0.0 && supply <= 1e4) || !std::isfinite(shaft.angle) || !(std::abs(shaft.speed) <= 1e5) ||
       !(duration > 0.0 && duration <= 0.01)) {
     throw std::invalid_argument(fmt::format(
-        "inverter: supply = {} V, shaft at {} rad with {} rad/s, duration = {} s: allowed are 0 to "
-        "1e4 V, finite angles, speeds up to 1e5 rad/s, durations up to 0.01 s",
+        "inverter: supply = {} V, shaft at {} rad with {} rad/s, duration = {} s: allowed are 0 to 1e4 V, "
+        "finite angles, speeds up to 1e5 rad/s, durations up to 0.01 s",
         supply, shaft.angle, shaft.speed, duration));
   }
   return Propagation<Motor>(motor, config_, command, supply).over(shaft, duration);

@@ -6,9 +6,9 @@
 // [axis1.device] and so on, as many as the firmware has axes.
 //
 // Numbers are in SI units, or texts with a unit that converts ("60 g"). Those that are not given keep the
-// defaults of the model structs. The wall that a motion aims at
-// is by default the one of the parameters `wall.position` and `wall.side` (`axis1.wall...` for the second
-// axis); a motion that names another one is refused.
+// defaults of the model structs. The wall that a motion aims at is by default the one of the parameters
+// `wall.position` and `wall.side` (`axis1.wall...` for the second axis); a motion that names another one is
+// refused.
 //
 // Refused with SceneError, whose text begins with file:line:column and gives the key, its value and what is
 // allowed: syntax errors, unknown keys (with what may have been meant), wrong types, values out of range,

@@ -93,8 +93,8 @@ void SceneDrives::look_at_parts() const {
   if (volts <= static_cast<double>(parts.weakest())) return;
   const auto refuse = [&](std::string_view what, float rated, float borne) {
     throw PartBroken(fmt::format(
-        "the supply reached {:.2f} V: the {} of the {:.0f} V board are rated for {:.0f} V and bear "
-        "{:.4g} V; they are broken now (part_ratings = false in [supply] goes on)",
+        "the supply reached {:.2f} V: the {} of the {:.0f} V board are rated for {:.0f} V and bear {:.4g} V; "
+        "they are broken now (part_ratings = false in [supply] goes on)",
         volts, what, parts.supply, rated, borne));
   };
   if (parts.capacitor_surge() <= parts.mosfets)

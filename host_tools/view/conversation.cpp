@@ -236,8 +236,7 @@ std::string Conversation::too_long_while_armed(const device::CaptureSettings& se
       settings.samples == 0 ? firmware::capture_words : settings.samples * settings.channels.size();
   if (values <= most) return {};
   return fmt::format(
-      "to read its {} values would take longer than half of link.timeout: at most {} while an "
-      "axis is armed",
+      "to read its {} values would take longer than half of link.timeout: at most {} while an axis is armed",
       values, most);
 }
 
@@ -256,8 +255,7 @@ std::string Conversation::arm(const Command& command) {
     if (const std::string why = too_long_while_armed(*capture); !why.empty())
       throw base::ValueError(
           fmt::format("axis {} was not armed: a capture is under way, and too long for that: {}; wait for "
-                      "its end, or begin "
-                      "a shorter one in its place",
+                      "its end, or begin a shorter one in its place",
                       command.axis, why));
   }
   commands_.armed_by(command.axis, command.client);

@@ -41,8 +41,7 @@ class Conversation {
   /// What there is to do now, and a moment's wait. A procedure that has been started goes on in it to its
   /// end, and is cancelled when `ended`, which is asked a few times a second meanwhile.
   void step(const std::function<bool()>& ended = {});
-  /// Disarms what clients have armed (disarm_of_clients), also after a stop that comes
-  /// meanwhile.
+  /// Disarms what clients have armed (disarm_of_clients), also after a stop that comes meanwhile.
   void end();
 
  private:

@@ -197,6 +197,21 @@ def telling_names(tree):
                 yield path, f"'{part}' says nothing"
 
 
+def whole_phrases(tree):
+    """A text is not left as the formatter broke it when a word was put in: a few letters alone between two full lines."""
+    scrap, literal = re.compile(r'\s*"[^"]{1,19}"$'), re.compile(r'\s*"')
+    remark = re.compile(r"(\s*///?)(\s+)(\S.*)$")
+    for path, text in tree.items():
+        lines = text.splitlines()
+        for number, (before, line, after) in enumerate(zip(lines, lines[1:], lines[2:]), 2):
+            if scrap.match(line) and literal.match(before) and literal.match(after) and "\\n" not in before + line:
+                yield path, f"{path}:{number}: {line.strip()} alone"
+            one, short, hanging = remark.match(before), remark.match(line), remark.match(after)
+            if (one and short and hanging and len(before) >= 92 and len(short[3]) < 20
+                    and len(hanging[2]) > len(short[2]) == len(one[2])):
+                yield path, f"{path}:{number}: {line.strip()} alone"
+
+
 def namespaces(tree):
     """A reader who has a name's namespace has its folder, and the other way round."""
     for path, text in product(tree).items():
@@ -221,7 +236,7 @@ def test_namespaces(tree):
 
 
 RULES = [floors, folder_order, pragma_once, class_in_one_place, class_size, friends, using_namespace, telling_names,
-         namespaces, test_namespaces]
+         whole_phrases, namespaces, test_namespaces]
 
 
 def repository():
@@ -328,6 +343,13 @@ class EachRuleSees(unittest.TestCase):
         self.good(telling_names, "host_tools/base/units.hpp", "")
         self.bad(telling_names, "host_tools/utils/units.hpp", "")
         self.bad(telling_names, "firmware/axis_manager.hpp", "")
+
+    def test_whole_phrases(self):
+        full = '  "' + 90 * "a" + ' "\n'
+        self.good(whole_phrases, "control/a.cpp", full + full + '  "b");\n')
+        self.bad(whole_phrases, "control/a.cpp", full + '  "may "\n' + full)
+        self.good(whole_phrases, "control/a.cpp", "// - " + 90 * "a" + "\n//   was\n//   b\n")
+        self.bad(whole_phrases, "control/a.cpp", "//   " + 90 * "a" + "\n//   was\n//     b\n")
 
     def test_namespaces(self):
         self.good(namespaces, "host_tools/device/can/a.hpp", "namespace kmax::device {\n")

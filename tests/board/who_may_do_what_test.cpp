@@ -236,8 +236,7 @@ constexpr Attempt attempts[] = {{"force.limit", 1000},
 std::string table_of_values() {
   std::string text =
       "| written | no force | operation enabled, by its commander's link | by the other | force fades, by "
-      "its "
-      "commander's link | by the other | by broadcast | in a PDO | locked "
+      "its commander's link | by the other | by broadcast | in a PDO | locked "
       "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (const Attempt& one : attempts) {
     const Entry& entry = firmware::entry_at(firmware::entry_named(one.name));
@@ -344,8 +343,7 @@ std::vector<Service> services() {
 std::string table_of_services() {
   std::string text =
       "| asked for | ready to switch on | operation enabled over serial | over CAN | force fades, of serial "
-      "| "
-      "of CAN |\n|---|---|---|---|---|---|\n";
+      "| of CAN |\n|---|---|---|---|---|---|\n";
   for (const Service& one : services()) {
     text += "| " + std::string(one.name);
     for (const DriveState state :

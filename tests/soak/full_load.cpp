@@ -57,8 +57,7 @@ class FullLoad {
                 100.0 * load, telemetry / lasted, answers / lasted);
     std::printf(
         "captures %u, of %u values; saves: %u refused while armed, %u done while disarmed, %u of them with "
-        "an "
-        "erase\n",
+        "an erase\n",
         captures_, values_, refused_, saved_, erased_);
     std::printf("missed ticks %u; besides, with the power stage off, %u in erases\n",
                 bench_.number("counters.missed_ticks") - missed_in_erases_, missed_in_erases_);

@@ -198,9 +198,8 @@ report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<Ap
       std::abs(needed.mean - printed) <= experiment::magnetic_tolerance
           ? fmt::format(
                 "{}. Eq. 7 as printed commands that much where the handle moves at {:.2f} m/s, and falls "
-                "back to 0.8 N at rest. One way to {} N/mm would be touches that meet the wall that "
-                "fast, with a coefficient that stays for the whole contact, as only a very long hold "
-                "keeps it.",
+                "back to 0.8 N at rest. One way to {} N/mm would be touches that meet the wall that fast, "
+                "with a coefficient that stays for the whole contact, as only a very long hold keeps it.",
                 given, needed.approach_speed, n_per_mm(printed))
           : fmt::format("{}, the nearest to {} N/mm that one between 0 and 4 N comes.", given,
                         n_per_mm(printed)));
@@ -212,11 +211,11 @@ report::Section adaptive_gap_section(const SubjectSet& set, const std::vector<Ap
   section.paragraphs.push_back(
       slow_is_best
           ? fmt::format(
-                "Another is to touch slowly only: at {:g} m/s alone the best mode reaches {} N/mm, "
-                "with a field of 0.8 N, because a slow touch hardly starts the oscillation. But then the "
-                "constant 2 N reaches {}, and the calibration no longer holds: the study \"assumptions\" "
-                "fits again to slow touches, in its rows on the approach speed. A third, a law that rises "
-                "faster than the printed one, is the next section's. Others were not looked for.",
+                "Another is to touch slowly only: at {:g} m/s alone the best mode reaches {} N/mm, with a "
+                "field of 0.8 N, because a slow touch hardly starts the oscillation. But then the constant 2 "
+                "N reaches {}, and the calibration no longer holds: the study \"assumptions\" fits again to "
+                "slow touches, in its rows on the approach speed. A third, a law that rises faster than the "
+                "printed one, is the next section's. Others were not looked for.",
                 slowest.approach_speed, n_per_mm(best), n_per_mm(slowest.walls[0].mean))
           : fmt::format("To touch slowly only is no way: at {:g} m/s alone the best mode reaches {} N/mm, "
                         "and no more than at a faster approach.",

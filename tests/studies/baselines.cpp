@@ -401,17 +401,16 @@ report::Section noticed_section(const SubjectSet& set, const std::vector<Baselin
       fmt::format("What people notice ({})", experiment::clip_words(set.device)), {}, {}, {}};
   section.paragraphs = {
       fmt::format(
-          "A force must differ by about {:g} % to be noticed: so much in matching forces of the arm "
-          "(Jones 1989, Perception 18, 681 to 687), 5 to 10 % in pinching at 2.5 to 10 N (Pang, Tan "
-          "and Durlach 1991, Perception and Psychophysics 49, 531 to 540). {:.3g} N is that of {:.3g} "
-          "N, the most that the papers' device pushes with. Both are of forces that are held; a "
-          "vibration in the skin's best range is felt far below, so that a wall that passes here may "
-          "still buzz.",
+          "A force must differ by about {:g} % to be noticed: so much in matching forces of the arm (Jones "
+          "1989, Perception 18, 681 to 687), 5 to 10 % in pinching at 2.5 to 10 N (Pang, Tan and Durlach "
+          "1991, Perception and Psychophysics 49, 531 to 540). {:.3g} N is that of {:.3g} N, the most that "
+          "the papers' device pushes with. Both are of forces that are held; a vibration in the skin's best "
+          "range is felt far below, so that a wall that passes here may still buzz.",
           noticed_share * 100.0, band, band / noticed_share),
       fmt::format(
-          "A flicker between two counts of {:g} um swings by {:.3g} N from {} N/mm on. So judged the "
-          "plain wall holds {} N/mm, and {} the most of these walls, {}: {}. With counts of {:g} um, "
-          "where that begins at {} N/mm, {} holds {}, {}.",
+          "A flicker between two counts of {:g} um swings by {:.3g} N from {} N/mm on. So judged the plain "
+          "wall holds {} N/mm, and {} the most of these walls, {}: {}. With counts of {:g} um, where that "
+          "begins at {} N/mm, {} holds {}, {}.",
           count * 1e6, band, flickers(count), n_per_mm(results.front().notices.mean),
           n_per_mm(most.notices.mean), most.law.name, times(most.notices, results.front().notices),
           finer_count * 1e6, flickers(finer_count), most_finer.first,

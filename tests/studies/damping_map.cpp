@@ -94,8 +94,8 @@ report::Section damping_section(const SubjectSet& set, const std::vector<Damping
     section.tables.push_back(std::move(table));
   }
   report::Table best{
-      "Largest stiffness, N/mm, stable by both criteria; of a damped plain wall the best, with its "
-      "damping in N s/m",
+      "Largest stiffness, N/mm, stable by both criteria; of a damped plain wall the best, with its damping "
+      "in N s/m",
       {"loop and device", "plain", "field of 2 N", "adaptive, instant"},
       {}};
   for (const auto estimator : all_estimators) best.columns.push_back("damped, " + estimator_name(estimator));

@@ -223,9 +223,8 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
       "Velocity estimators: error against cost",
       {{"Cheaper than FOAW",
         {"Tried against FOAW with the best fit and 16 intervals; tests/studies/velocity_candidates.hpp "
-         "says how each works. Instructions of one sample on the Cortex-M4, history included, "
-         "counted over motions of every kind; a division is one of them and takes 14 cycles. Means over "
-         "the " +
+         "says how each works. Instructions of one sample on the Cortex-M4, history included, counted over "
+         "motions of every kind; a division is one of them and takes 14 cycles. Means over the " +
              std::to_string(cases.size()) + " cases below are geometric.",
          fmt::format(
              "No incremental form of FOAW gives its results: all its lines begin at the newest sample, so "
@@ -236,18 +235,18 @@ report::Page velocity_page(const std::vector<VelocityCase>& cases, const std::ve
          fmt::format(
              "The winner is the edge period over 16 samples: {} instructions at worst where FOAW takes {}, "
              "and {:.2f} of its error at 20 kHz, {:.2f} at 2 kHz and {:.2f} at 500 Hz. In {} of {} cases it "
-             "has less error, or at most a tenth more. Coarse counts at high rates gain most; a slow ramp "
-             "on fine counts at a low rate loses most. It reads 0 below one step in 4096 samples, and where "
-             "the count goes to and fro by one. It is in the image: velocity.estimator edge_period. FOAW "
-             "stays the default and the reference.",
+             "has less error, or at most a tenth more. Coarse counts at high rates gain most; a slow ramp on "
+             "fine counts at a low rate loses most. It reads 0 below one step in 4096 samples, and where the "
+             "count goes to and fro by one. It is in the image: velocity.estimator edge_period. FOAW stays "
+             "the default and the reference.",
              worst_of(edge_period), worst_of(0), at(20e3), at(2e3), at(500.0), as_good, cases.size())},
         {summary, errors},
         {}},
        {"How stiff a damped wall may be",
         {"One simulated person, the plain wall with a damper by each estimator, force not clipped, in "
          "steps of 3 %; unstable is what moves by more than three counts or swings by more than 1 N. One "
-         "count is 1 N at 18.2 N/mm with 55 um and at 182 with 5.5 um, so 17.9 and 179 are the most that "
-         "can be found, and equal ones do not say which estimator is better."},
+         "count is 1 N at 18.2 N/mm with 55 um and at 182 with 5.5 um, so 17.9 and 179 are the most that can "
+         "be found, and equal ones do not say which estimator is better."},
         {stiffness},
         {}}}};
 }

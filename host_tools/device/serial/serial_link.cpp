@@ -127,8 +127,7 @@ void SerialLink::fail_unanswered(std::span<const std::uint8_t> request, const Un
         address_.path, address_.unit, address_.baud_rate, patience_.count(), asked, tried));
   throw LinkError(
       fmt::format("{}: what came back from unit {} at {} baud is no Modbus response ({}, {}); check the baud "
-                  "rate, the wiring "
-                  "and its shielding, and that no other device has the same unit",
+                  "rate, the wiring and its shielding, and that no other device has the same unit",
                   address_.path, address_.unit, address_.baud_rate, asked, tried));
 }
 

@@ -25,8 +25,8 @@ namespace {
     case EACCES:
     case EPERM:
       throw LinkError(fmt::format(
-          "{}: you may not open this port; join the group that owns it (on most systems 'sudo usermod "
-          "-aG dialout $USER', then log in again) or install a udev rule",
+          "{}: you may not open this port; join the group that owns it (on most systems 'sudo usermod -aG "
+          "dialout $USER', then log in again) or install a udev rule",
           path));
     default:
       throw LinkError(fmt::format("{}: cannot open the port: {}", path, std::strerror(error)));

@@ -68,8 +68,8 @@ std::vector<Subject> draw_subjects(std::size_t count, std::uint64_t seed,
                                    const HandRanges& ranges = {});
 
 // Numbers that are not given keep the defaults of the models. Throw simulation::SceneError, whose text begins
-// with file:line:column: syntax, unknown keys, values out of range, a [fitted] without one of
-// its numbers, nobody in the set, a name given twice.
+// with file:line:column: syntax, unknown keys, values out of range, a [fitted] without one of its numbers,
+// nobody in the set, a name given twice.
 SubjectSet load_subject_set(const std::filesystem::path& path);
 SubjectSet parse_subject_set(std::string_view text, std::string_view source);
 // A file, or one of the sets in the program itself by its name if there is no such file.

@@ -161,8 +161,7 @@ namespace {
 std::string_view hand_origin_words(const ResolutionStudy& study) {
   return study.chosen_to_agree() ? "These two numbers were chosen so that they do: calibrated, not predicted."
                                  : "Hand and wall are as asked for, and nothing was fitted: that both appear "
-                                   "says that such a hand "
-                                   "suffices, not that anybody has one.";
+                                   "says that such a hand suffices, not that anybody has one.";
 }
 
 /// By how much 0.4 mm vibrates, and how many other settings show both claims.
@@ -217,8 +216,7 @@ std::vector<std::string> resolution_words(const ResolutionStudy& study) {
   words.push_back(fmt::format(
       "The paper's criterion K max(eta, delta v T) <= F_h is quasi-static and not a condition of passivity. "
       "It asks {:.2f} N of a hand at 0.4 mm and {:.2f} N at 0.1 mm, and begins to depend on the speed at "
-      "{:g} "
-      "and {:g} m/s. The table has what it asks at the step of whole counts, which is a little smaller.",
+      "{:g} and {:g} m/s. The table has what it asks at the step of whole counts, which is a little smaller.",
       study.wall.stiffness * 0.4e-3, study.wall.stiffness * 0.1e-3, 0.4e-3 * study.wall.haptic_rate,
       0.1e-3 * study.wall.haptic_rate));
   return words;

@@ -200,8 +200,8 @@ void refuse_while_armed(Context& context, const WayIn& way) {
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
       if (device::Drive(device, axis).status().armed())
         throw flash::FlashError(fmt::format(
-            "axis {} is armed: its force would end in whatever way the reset leaves it; 'kmax disarm' "
-            "first. Nothing was changed",
+            "axis {} is armed: its force would end in whatever way the reset leaves it; 'kmax disarm' first. "
+            "Nothing was changed",
             axis));
     }
     if (!way.restarted) return;
@@ -215,8 +215,7 @@ void refuse_while_armed(Context& context, const WayIn& way) {
     if (way.must_be_named)
       throw flash::FlashError(
           fmt::format("the device that is named does not answer, so it may be another board than {}, the "
-                      "only one on USB: "
-                      "name that one. Nothing was changed ({})",
+                      "only one on USB: name that one. Nothing was changed ({})",
                       way.restarted->address(), error.what()));
     context.note(fmt::format("the board does not answer, so it was not asked whether an axis is armed: {}",
                              error.what()));

@@ -130,8 +130,8 @@ void hold(Context& context, Device& device, Drive& drive, double timeout,
 void note_what_ends_the_force(Context& context, double link_timeout) {
   if (link_timeout > 0)
     context.note(fmt::format(
-        "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps "
-        "it alive",
+        "the force is removed, with a fault, after {} s (link.timeout) without a command; --hold keeps it "
+        "alive",
         base::number_text(static_cast<float>(link_timeout))));
   if (link_timeout == 0)
     context.note("link.timeout is 0: the force stays on until it is disarmed, even if the host dies");

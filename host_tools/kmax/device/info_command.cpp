@@ -136,8 +136,8 @@ int run_info(Context& context) {
 void add_info_command(CLI::App& app, Context& context) {
   add_command(app, context,
               {"info",
-               "Shows what the device is, its firmware, board, clock, last reset and crash, "
-               "kept parameters, uptime and link counters.",
+               "Shows what the device is, its firmware, board, clock, last reset and crash, kept parameters, "
+               "uptime and link counters.",
                "  kmax info\n  kmax info --device 'serial:/dev/ttyUSB0?unit=2'"},
               Takes::device, run_info);
 }

@@ -81,8 +81,8 @@ void MaxStiffnessOptions::declare(CLI::App& command, Context& context) {
   simulated
       ->add_option(
           "--clip", clip,
-          "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, "
-          "whose gamma was fitted to it; on, unless --subjects says otherwise")
+          "Does the device clip its force at 3.3 N, as the papers' does? Each has people of its own, whose "
+          "gamma was fitted to it; on, unless --subjects says otherwise")
       ->check(CLI::IsMember({"on", "off", "both"}));
   simulated->add_option("--seed", seed, "Draw other people with this seed; not fitted unless --calibrate");
   simulated->add_flag(

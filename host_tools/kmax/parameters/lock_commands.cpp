@@ -30,8 +30,7 @@ std::uint32_t code_in(std::string text, std::uint32_t least, const std::string& 
   if (whole && code >= least) return code;
   throw UsageError(
       fmt::format("{}: a code is a whole number from {} to 4294967295, in digits without a 0 in front and "
-                  "nothing else on "
-                  "the line",
+                  "nothing else on the line",
                   from, least));
 }
 
@@ -42,8 +41,8 @@ struct CodeSource {
     command
         .add_option(
             "--code-file", file,
-            "File whose only line is the code; without it the code is asked for, or read from standard "
-            "input if that is no terminal")
+            "File whose only line is the code; without it the code is asked for, or read from standard input "
+            "if that is no terminal")
         ->option_text("FILE");
   }
   std::uint32_t present_code(Context& context) const { return code_of(context, "code of the write lock", 1); }

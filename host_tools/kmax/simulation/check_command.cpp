@@ -96,8 +96,8 @@ Settings settings_of(Context& context, const CheckOptions& options) {
 MapAxis map_side(const std::string& text, std::size_t axis) {
   if (base::trimmed(text).starts_with("structure."))
     throw UsageError(fmt::format(
-        "--map {}: a map's sides are parameters of the device; give the structure with --set, and it "
-        "is the same at every point of the map",
+        "--map {}: a map's sides are parameters of the device; give the structure with --set, and it is the "
+        "same at every point of the map",
         text));
   return check::parse_map_axis(text, axis);
 }

@@ -19,8 +19,8 @@ struct ServeOptions {
         ->type_name("LINK");
     command
         .add_option("--can", can,
-                    "SocketCAN interface to be a CANopen node on; a name with a '/' is a bus that is "
-                    "served at that Unix domain socket")
+                    "SocketCAN interface to be a CANopen node on; a name with a '/' is a bus that is served "
+                    "at that Unix domain socket")
         ->type_name("IFACE");
     command.add_option("--scene", scene, "TOML file or supplied scene (default: touch, factory parameters)")
         ->type_name("SCENE");

@@ -59,11 +59,10 @@ struct ForceLoopOptions {
 ///
 /// Calls are safe from any number of threads; they take turns. One force loop, recording or capture goes on
 /// at a time, and a second one waits for it, or is a RefusedError in the first one's function; settings and
-/// readings go on beside it. A device belongs to the process that opened
-/// it: a fork's child gets an Error. Other programs can use the link in between, to stop it for
-/// instance: whenever this one has nothing to say, and for a moment every 500 ms while it talks without a
-/// pause. Errors of all calls: LinkError, RefusedError, ValueError, and Error
-/// for a closed device.
+/// readings go on beside it. A device belongs to the process that opened it: a fork's child gets an Error.
+/// Other programs can use the link in between, to stop it for instance: whenever this one has nothing to say,
+/// and for a moment every 500 ms while it talks without a pause. Errors of all calls: LinkError,
+/// RefusedError, ValueError, and Error for a closed device.
 class KMAX_API Device {
  public:
   /// "usb[:SERIAL]", "can:IFACE[?node=1]", "can:/PATH/OF/A/BUS", "serial:PATH[?unit=1&baud=115200]", or

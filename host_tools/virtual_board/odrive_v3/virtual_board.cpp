@@ -371,8 +371,7 @@ void VirtualBoard::look_at_logic_supply() {
   } else if (volts < least_at_full_speed) {
     throw std::runtime_error(
         fmt::format("at {:.6f} s: the processor runs at {} MHz with {} wait states from {:.2f} V; it needs "
-                    "2.7 V, and its "
-                    "brown-out level lets it run from {:.1f} V on",
+                    "2.7 V, and its brown-out level lets it run from {:.1f} V on",
                     seconds(now()), units_per_second / clocks_.core / 1'000'000, flash_.wait_states(), volts,
                     thresholds[flash_.brown_out_level()]));
   }

@@ -40,8 +40,8 @@ GpioBridge::GpioBridge(VirtualBoard& board, const std::string& chip, ReportText 
   for (unsigned line = 0; line < line_count; ++line) {
     if (!fs::exists(line_folder(chip_, line) / "value"))
       throw std::runtime_error(fmt::format(
-          "--gpio {}: the chip has no line {}; needed are NRST, BOOT0, ESTOP, FAULT and HEALTHY as "
-          "lines 0 to {}",
+          "--gpio {}: the chip has no line {}; needed are NRST, BOOT0, ESTOP, FAULT and HEALTHY as lines 0 "
+          "to {}",
           chip, line, line_count - 1));
   }
   for (unsigned line = 0; line < levels_.size(); ++line) {

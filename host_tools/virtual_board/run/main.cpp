@@ -157,16 +157,14 @@ int main(int argc, char** argv) {
       ->type_name("CHIP");
   app.add_option(
          "--bench", options.bench,
-         "Named pipe that takes what a person at the bench does, a line each: push AXIS NEWTON, swing "
-         "AXIS NEWTON, release AXIS, unplug AXIS, plug AXIS, plant AXIS DEFECT, mend AXIS DEFECT, stop "
-         "open, stop closed; made if missing")
+         "Named pipe that takes what a person at the bench does, a line each: push AXIS NEWTON, swing AXIS "
+         "NEWTON, release AXIS, unplug AXIS, plug AXIS, plant AXIS DEFECT, mend AXIS DEFECT, stop open, stop "
+         "closed; made if missing")
       ->type_name("PIPE");
   app.add_option("--usbip", options.usbip,
                  "TCP port of this machine at which the board's USB connector is offered to USB/IP clients, "
-                 "as device "
-                 "1-1; 3240 is usual, 0 takes one that is free and says which. The cable is plugged in while "
-                 "a client "
-                 "is there")
+                 "as device 1-1; 3240 is usual, 0 takes one that is free and says which. The cable is "
+                 "plugged in while a client is there")
       ->type_name("PORT");
   app.add_option("--scene", options.scene,
                  "What is plugged in: TOML file or supplied scene. An axis without a motor in it is an open "
@@ -175,9 +173,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option(
          "--store", options.store,
-         "File that keeps what 'kmax save' saves (32 KiB, made if missing); written when this program "
-         "ends in order. What the scene says, its hardware and its [parameters], replaces the kept values "
-         "at each start")
+         "File that keeps what 'kmax save' saves (32 KiB, made if missing); written when this program ends "
+         "in order. What the scene says, its hardware and its [parameters], replaces the kept values at each "
+         "start")
       ->type_name("FILE");
   app.add_option("--voltage", options.volts, "Variant written into the board: 24 or 56")
       ->check(CLI::IsMember({24, 56}))

@@ -123,18 +123,16 @@ report::Section controller_section() {
   section.tables.push_back(std::move(both));
   section.paragraphs = {
       "Compared: the study of the largest stiffness as 'kmax experiment max-stiffness' makes it (12 people, "
-      "eight walls, 15 touches at every stiffness in steps of 0.1 N/mm, 500 Hz), "
-      "every touch with the firmware's haptic loop and its judge, "
-      "once with the exact method and its shared matrices and once with RK4. "
-      "Speed: simulated seconds per second of processor time; of the exact method the best of 3. "
+      "eight walls, 15 touches at every stiffness in steps of 0.1 N/mm, 500 Hz), every touch with the "
+      "firmware's haptic loop and its judge, once with the exact method and its shared matrices and once "
+      "with RK4. Speed: simulated seconds per second of processor time; of the exact method the best of 3. "
       "'speed_and_error_benchmark --controller' measures this section alone.",
-      "Against: the exact method's own result. A largest stiffness is wanted to 0.1 N/mm, "
-      "one step of the search, of the means of the people or of each of them: "
-      "a wall that is held just so is decided by single counts, "
-      "so one person may be further off than the mean.",
+      "Against: the exact method's own result. A largest stiffness is wanted to 0.1 N/mm, one step of the "
+      "search, of the means of the people or of each of them: a wall that is held just so is decided by "
+      "single counts, so one person may be further off than the mean.",
       fmt::format(
-          "{} {} The ratio at equal error answers another question, "
-          "what RK4 would need to be as exact as the exact method, which no largest stiffness asks for.",
+          "{} {} The ratio at equal error answers another question, what RK4 would need to be as exact as "
+          "the exact method, which no largest stiffness asks for.",
           needed_words("the means", of_means), needed_words("everybody", of_people))};
   return section;
 }

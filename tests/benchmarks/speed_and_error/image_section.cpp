@@ -57,10 +57,10 @@ report::Section image_section(const std::filesystem::path& budget) {
       "for this computer and in the flashed image on the virtual board, which counts the image's "
       "instructions and models the cycles of each (host_tools/virtual_board/cortex_m/instruction.hpp; wait "
       "states of the flash are left out). The input differs, the code does not.",
-      "The values are equal bit for bit: tests/image/parity/parity_test.cpp repeats every call of the axis' tick in "
-      "the image on this side with the very bytes that it was given, and allows no difference. So there is "
-      "no error to weigh against the speed here. What the other steps of the image's tick cost stands in "
-      "[virtual_board.md](virtual_board.md)."};
+      "The values are equal bit for bit: tests/image/parity/parity_test.cpp repeats every call of the axis' "
+      "tick in the image on this side with the very bytes that it was given, and allows no difference. So "
+      "there is no error to weigh against the speed here. What the other steps of the image's tick cost "
+      "stands in [virtual_board.md](virtual_board.md)."};
   report::Table loop{"HapticLoop::tick(), one call:", {"where", "instructions", "cycles", "time (us)"}, {}};
   loop.rows.push_back({"image, Cortex-M4F at 168 MHz", fmt::format("{:.0f}", instructions),
                        fmt::format("{:.0f}", cycles), microseconds(cycles)});

@@ -43,8 +43,7 @@ TEST_F(FlashPlanText, OpenOcdOverGpioLines) {
       "bin' -c 'flash write_image erase image_08000000.bin 0x08000000 bin' -c 'verify_image "
       "image_08000000.bin 0x08000000 bin' -c 'dump_image read_08000000.bin 0x08000000 400' -c 'dump_image "
       "read_0800c000.bin 0x0800c000 20408' -c 'dump_image parameters_after.bin 0x08004000 32768' -c 'set "
-      "options "
-      "[read_memory 0x40023c14 32 1]; if {$options & 0xc} {mww 0x40023c08 0x08192a3b; mww 0x40023c08 "
+      "options [read_memory 0x40023c14 32 1]; if {$options & 0xc} {mww 0x40023c08 0x08192a3b; mww 0x40023c08 "
       "0x4c5d6e7f; mww 0x40023c14 [expr {$options & ~0xf}]; mww 0x40023c14 [expr {($options & ~0xf) | 2}]; "
       "sleep 500; mww 0x40023c14 [expr {($options & ~0xf) | 1}]}' -c shutdown");
   EXPECT_CONTAINS(texts[1], "start: tool ");

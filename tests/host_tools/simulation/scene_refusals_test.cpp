@@ -206,8 +206,8 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
            {"[device]\nmass = \"heavy\"\n",
             "2:8: device.mass = 'heavy' is not a number; allowed is a number from 0.0001 to 100 kg"},
            {"[device]\n\n  mas = 1.0\n",
-            "3:3: device.mas = 1.0: unknown key; allowed here: mass, damping, friction, force_limit, "
-            "delay, start_position, start_velocity; did you mean mass?"},
+            "3:3: device.mas = 1.0: unknown key; allowed here: mass, damping, friction, force_limit, delay, "
+            "start_position, start_velocity; did you mean mass?"},
            {"[device]\n[operator]\ngrip = 1\n",
             "3:1: operator.grip = 1: unknown key; allowed here: grip_stiffness, grip_damping, hand_mass, "
             "arm_stiffness, arm_damping, activation_gain, activation_time, activation_limit, push_lag"},
@@ -221,8 +221,7 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
            {"[axis1.device]\n", "1:1: [device] is missing: every axis needs a device"},
            {motion + "wall_side = -1\nwall_position = 0.0\n[parameters]\nwall.position = -0.01\n",
             "6:17: motion.wall_position = 0: the parameter wall.position is -0.01 (bad.toml:8:17); allowed "
-            "is "
-            "the same value, or none here"},
+            "is the same value, or none here"},
            {"[device]\n[axis1.device]\n[axis1.operator]\nsame_person = true\n",
             "4:15: axis1.operator.same_person = true: nobody holds axis 0; allowed is that with an "
             "[operator]"},
@@ -260,37 +259,37 @@ TEST(SceneRefusals, NamePlaceKeyValueAndWhatIsAllowed) {
             "2:1: encoder.index_position = 4000: allowed is a whole number below counts_per_turn = 4000"},
            // Parts that contradict each other.
            {"[device]\ndelay = 1e-3\n[motor]\nkind = \"dc\"\n",
-            "2:9: device.delay = 0.001: with this [motor] the circuit makes the delay; "
-            "allowed is 0 there, or a delay with [motor] kind = \"ideal\""},
+            "2:9: device.delay = 0.001: with this [motor] the circuit makes the delay; allowed is 0 there, "
+            "or a delay with [motor] kind = \"ideal\""},
            {"[device]\n[axis1.device]\ndelay = 1e-3\n[axis1.motor]\nkind = \"pmsm\"\n",
-            "3:9: axis1.device.delay = 0.001: with this [axis1.motor] the circuit makes the "
-            "delay; allowed is 0 there, or a delay with [axis1.motor] kind = \"ideal\""},
+            "3:9: axis1.device.delay = 0.001: with this [axis1.motor] the circuit makes the delay; allowed "
+            "is 0 there, or a delay with [axis1.motor] kind = \"ideal\""},
            {"[device]\n[integrator]\nsubsteps = 10\n",
-            "3:12: integrator.substeps = 10: integrator.kind is \"exact\", which has none; "
-            "allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
+            "3:12: integrator.substeps = 10: integrator.kind is \"exact\", which has none; allowed is that "
+            "with kind = \"semi_implicit_euler\" or \"rk4\""},
            {"[device]\n[integrator]\nkind = \"adaptive\"\nsubsteps = 10\n",
-            "4:12: integrator.substeps = 10: integrator.kind is \"adaptive\", which has "
-            "none; allowed is that with kind = \"semi_implicit_euler\" or \"rk4\""},
+            "4:12: integrator.substeps = 10: integrator.kind is \"adaptive\", which has none; allowed is "
+            "that with kind = \"semi_implicit_euler\" or \"rk4\""},
            {"[device]\n[integrator]\nkind = \"rk4\"\ntolerance = 1e-9\n",
-            "4:13: integrator.tolerance = 1e-09: integrator.kind is \"rk4\", which has "
-            "none; allowed is that with kind = \"adaptive\""},
+            "4:13: integrator.tolerance = 1e-09: integrator.kind is \"rk4\", which has none; allowed is that "
+            "with kind = \"adaptive\""},
            {"[device]\n[motor]\nkind = \"ideal\"\nresistance = 1\n",
             "4:1: motor.resistance = 1: unknown key; allowed here: kind"},
            {"[device]\n[motor]\nkind = \"ideal\"\ndefects = [\"phase_b_open\"]\n",
-            "4:11: motor.defects = [array]: an ideal motor has nothing that could break; "
-            "allowed is motor.kind = \"dc\" or \"pmsm\", or no defects"},
+            "4:11: motor.defects = [array]: an ideal motor has nothing that could break; allowed is "
+            "motor.kind = \"dc\" or \"pmsm\", or no defects"},
            {"[device]\n[motor]\nkind = \"ideal\"\n[inverter]\n",
-            "4:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no "
-            "current; add the motor, or remove the table"},
+            "4:1: [inverter] without a [motor] of kind \"dc\" or \"pmsm\": there is no current; add the "
+            "motor, or remove the table"},
            {"[device]\n[encoder]\nreversed = true\n",
-            "3:12: encoder.reversed = true: how it is mounted belongs to a motor's encoder; "
-            "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
+            "3:12: encoder.reversed = true: how it is mounted belongs to a motor's encoder; allowed is that "
+            "with [motor] kind = \"dc\" or \"pmsm\""},
            {"[device]\n[encoder]\nkind = \"as5047p\"\n",
-            "3:8: encoder.kind = 'as5047p': this chip belongs to a motor's encoder; allowed "
-            "is that with [motor] kind = \"dc\" or \"pmsm\""},
+            "3:8: encoder.kind = 'as5047p': this chip belongs to a motor's encoder; allowed is that with "
+            "[motor] kind = \"dc\" or \"pmsm\""},
            {"[device]\n[encoder]\nindex_position = 3\n[motor]\nkind = \"ideal\"\n",
-            "3:18: encoder.index_position = 3: an index belongs to a motor's encoder; "
-            "allowed is that with [motor] kind = \"dc\" or \"pmsm\""},
+            "3:18: encoder.index_position = 3: an index belongs to a motor's encoder; allowed is that with "
+            "[motor] kind = \"dc\" or \"pmsm\""},
            {"[device]\n[encoder]\ncounts_per_turn = 16.5\nedge_noise = 0.1\n",
             "2:1: encoder.counts_per_turn = 16.5: allowed is a whole number"},
        }) {

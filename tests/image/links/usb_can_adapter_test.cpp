@@ -223,8 +223,7 @@ TEST_F(UsbCanAdapter, ThroughAFullBusBothWaysTheNodeIsNeverStarved) {
   bench.board->run_for(0.05);
   std::printf(
       "full bus (%.0f %% busy): %zu frames from the PC, %u from the bus; SDO over the first channel %.2f ms "
-      "at most, "
-      "over the bus %.2f ms\n",
+      "at most, over the bus %.2f ms\n",
       100.0 * busy / lasted, second.heard(0x6F0).size(), sent, worst * 1e3, second.worst_s() * 1e3);
   EXPECT_GT(busy, 0.9 * lasted) << "a full bus";
   EXPECT_LT(worst, 5e-3);

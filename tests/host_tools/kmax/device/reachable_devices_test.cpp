@@ -72,8 +72,8 @@ TEST(ReachableDevices, OnUsbWithAllThatItOffers) {
       "CAN interface of usb:1F2E3D4C, the board alone, up; 'kmax devices --can can0' looks for nodes on it");
   EXPECT_EQ(
       interfaces[1].description,
-      "CAN interface of usb:1F2E3D4C, with the bus at its connector, down: sudo ip link set can1 up type "
-      "can bitrate 1000000");
+      "CAN interface of usb:1F2E3D4C, with the bus at its connector, down: sudo ip link set can1 up type can "
+      "bitrate 1000000");
 }
 
 TEST(ReachableDevices, OnUsbWithWhatIsMissingAndHowToGetIt) {

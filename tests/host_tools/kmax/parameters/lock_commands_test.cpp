@@ -63,8 +63,8 @@ TEST_F(LockCommands, LockSetsACodeAndUnlockOpensWithIt) {
   EXPECT_EQ(state(), "locked");
   expect_error(
       {"set", "wall.stiffness=500"}, base::failed,
-      "the device refused: the device is locked; 'kmax unlock' opens it, with the code that its owner "
-      "has set; nothing was changed");
+      "the device refused: the device is locked; 'kmax unlock' opens it, with the code that its owner has "
+      "set; nothing was changed");
   expect_error({"save"}, base::failed, "the device is locked");
   expect_error({"defaults"}, base::failed, "the device is locked");
   ASSERT_EQ(lock("9999"), base::done);
@@ -96,8 +96,8 @@ TEST_F(LockCommands, WrongCodesAreRefusedWithTheTimeToWait) {
   EXPECT_EQ(unlock("4712"), base::failed);
   EXPECT_CONTAINS(
       said,
-      "the device was not opened: the device refused: the code is wrong; 1 wrong code was given, the "
-      "next one is taken in 1 s");
+      "the device was not opened: the device refused: the code is wrong; 1 wrong code was given, the next "
+      "one is taken in 1 s");
   device->wait(std::chrono::milliseconds(1100));
   EXPECT_EQ(kmax(with({"unlock", "--json"}, "4713")), base::failed);
   EXPECT_CONTAINS(document()["error"].get<std::string>(),
