@@ -203,7 +203,8 @@ class FoawVelocity {
 
   // Two rings. The positions, each written twice, so that the newest ones are contiguous; behind them, from
   // `sums` on, the sum and the double sum of every sample. Of these a window of n intervals needs those
-  //     before it: sum_{l=0..n} (n - 2l) y_{k-l} = (n + 1) (S_k + S_{k-n-1}) - (D_k - D_{k-n-1}),
+  // before it:
+  //     sum_{l=0..n} (n - 2l) y_{k-l} = (n + 1) (S_k + S_{k-n-1}) - (D_k - D_{k-n-1}),
   // D the double sum. Plain arrays: the compiler then knows that a write to one leaves the others alone.
   static constexpr std::uint32_t sums = 2 * ring;
   std::uint32_t rings_[4 * ring] = {};

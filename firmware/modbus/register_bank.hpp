@@ -5,15 +5,15 @@
 // with 1..125 registers to read and 1..123 to write.
 //
 //   read_holding(address, out)   fills `out` and returns none, or returns an exception; `out` is then not
-//   used. read_input(address, out)     the same for input registers. write_holding(address, in)   whole or
-//   nothing: writes every register and returns none, or changes nothing and
-//                                returns illegal_data_address   a register is missing or read-only, or the
-//                                                               range cuts a value of several registers in
-//                                                               two,
-//                                        illegal_data_value     a value is out of its range,
-//                                        server_device_failure, server_device_busy,
-//                                        negative_acknowledge   the device is locked (Modicon's PI-MBUS-300
-//                                                               has it for a programming request refused).
+//   used read_input(address, out)     the same for input registers write_holding(address, in)   whole or
+//   nothing: writes every register and returns none, or changes nothing
+//                                and returns
+//     illegal_data_address       a register is missing or read-only, or the range cuts a value of several
+//                                registers in two
+//     illegal_data_value         a value is out of its range
+//     server_device_failure, server_device_busy
+//     negative_acknowledge       the device is locked (Modicon's PI-MBUS-300 has it for a programming request
+//                                refused)
 //   has_holding(address, count)  true if read_holding() over this range returns none. Read/write-multiple
 //                                asks before it writes, since an exception for the read part must leave the
 //                                registers untouched.

@@ -129,8 +129,10 @@ inline constexpr std::array device_entries = std::to_array<Entry>({
         .at_standard_index(0x1018, 3),
     reading("info.serial_number", group::info, 4, Type::unsigned32, "", "Serial number.")
         .at_standard_index(0x1018, 4),
-    reading("info.dictionary_checksum", group::info, 5, Type::unsigned32, "",
-            "Checksum of this dictionary: host and device must agree on it."),
+    reading(
+        "info.dictionary_checksum", group::info, 5, Type::unsigned32, "",
+        "Checksum of this dictionary, of how many axes there are and of the tick rate: host and device must "
+        "agree on it. Stored parameters are taken over whatever theirs was."),
     reading("info.tick_rate", group::info, 6, Type::unsigned32, "Hz", "Ticks per second."),
     reading("info.core_clock", group::info, 7, Type::unsigned32, "Hz", "Processor clock."),
     named_reading("info.clock_source", group::info, 8, names::clock_source,

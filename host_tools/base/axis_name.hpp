@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 
 namespace kmax::base {
@@ -8,14 +9,16 @@ namespace kmax::base {
 struct AxisName {
   std::string_view axis;  ///< "axis" and digits; empty if the name begins otherwise
   std::string_view rest;
+  std::string_view digits;  ///< of the axis
 };
 constexpr AxisName split_axis(std::string_view name) {
   constexpr std::string_view word = "axis";
   const std::size_t dot = name.find('.');
-  if (dot == std::string_view::npos || !name.starts_with(word)) return {{}, name};
+  if (dot == std::string_view::npos || !name.starts_with(word)) return {{}, name, {}};
   const std::string_view digits = name.substr(word.size(), dot - word.size());
-  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos) return {{}, name};
-  return {name.substr(0, dot), name.substr(dot + 1)};
+  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos)
+    return {{}, name, {}};
+  return {name.substr(0, dot), name.substr(dot + 1), digits};
 }
 
 /// Axis 0 may be named or not: the name without it.

@@ -14,7 +14,8 @@ struct KnownBoard {
   std::string_view name;
   const board::BoardDescription* power_stage;
 };
-// A new board with a bridge has its row here; what is flashed and packaged of it, in flash/board_profile.cpp.
+// A board with a bridge needs a row here for calibration and the offsets of its amplifiers. What is flashed
+// of it is in flash/board_profile.cpp; the stages of bring_up are written for these boards alone.
 constexpr std::array<KnownBoard, 2> known_boards = {{
     {board::odrive_v3::description.name, &board::odrive_v3::description},
     // Simulated, it has the same power stage (simulated_board/simulated_power_hardware.hpp).
@@ -39,7 +40,8 @@ const board::BoardDescription& power_stage_of(device::Device& device) {
     known += fmt::format("{}{}", known.empty() ? "" : ", ", one.name);
   throw base::DeviceError(fmt::format(
       "the device {}, and what its power stage is (shunts, dead time, PWM) is not known here; known are {}: "
-      "take the tools that were built with the device's firmware",
+      "take the tools that were built with the device's firmware. A board without a bridge has no current to "
+      "measure",
       board.empty() ? "does not say which board it is" : fmt::format("says that it is the board '{}'", board),
       known));
 }

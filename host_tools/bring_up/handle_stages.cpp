@@ -134,7 +134,7 @@ void put_wall_here(device::Device& device, const Settings& settings) {
 /// The largest wall up to `most` that every criterion passes which applies; 0 if none does.
 double stiffest(device::Device& device, std::size_t axis, double most) {
   firmware::ParameterValues values;
-  for (const Parameter& parameter : check::parameters_of_case(axis))
+  for (const Parameter& parameter : check::parameters_of_judgement(axis))
     values.set_raw(parameter.slot(), device.read(parameter));
   const auto pass = [&](double stiffness) {
     values.set_raw(

@@ -8,9 +8,9 @@
 // (alternation `along` a bias: L_d; `across` it: L_q), amplitudes kept, so that R and L are those of a phase.
 // R contains the on-resistance of the legs. It is the circuit that the controller drives.
 //
-// Timing. Sample k is taken at tick k, voltage[k] acts from k + 1/2 to k + 3/2 (ticks). From one
-//   sample to the next, therefore, i[k+1] = a i[k] + (1/R) (s (1 - s) u[k-1] + (1 - s) u[k]),   a = e^(-R
-//   T/L),  s = sqrt(a)
+// Timing. Sample k is taken at tick k, voltage[k] acts from k + 1/2 to k + 3/2 (ticks). From one sample to
+// the next, therefore,
+//   i[k+1] = a i[k] + (1/R) (s (1 - s) u[k-1] + (1 - s) u[k]),   a = e^(-R T/L),  s = sqrt(a)
 // with u the voltage less dead time, offset and e: exact for every L/R, also far below a tick.
 //
 // Dead time. Each leg loses supply x f x t_dead against its current's sign. V_dt is what that amounts to

@@ -128,4 +128,14 @@ std::vector<device::Parameter> parameters_of_case(std::size_t axis) {
   return all;
 }
 
+std::vector<device::Parameter> parameters_of_judgement(std::size_t axis) {
+  using device::Parameter;
+  std::vector<Parameter> all = parameters_of_case(axis);
+  for (const Parameter& beside :
+       {Parameter::of<"velocity.estimator">(axis), Parameter::of<"wall.damping_window">(axis),
+        Parameter::of<"wall.touch_stiffness">(axis)})
+    if (std::find(all.begin(), all.end(), beside) == all.end()) all.push_back(beside);
+  return all;
+}
+
 }  // namespace kmax::check

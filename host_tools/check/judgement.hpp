@@ -85,6 +85,9 @@ control::StabilityCase<double> parameter_case(const firmware::ParameterValues& v
 /// The parameters that it reads, of that axis.
 std::vector<device::Parameter> parameters_of_case(std::size_t axis);
 
+/// Those that judge_parameters() reads: of the case, of what a guarantee covers, of a wall that grows.
+std::vector<device::Parameter> parameters_of_judgement(std::size_t axis);
+
 /// Whether a set of parameters does what is wanted.
 using Wanted = std::function<bool(const firmware::ParameterValues&)>;
 

@@ -20,10 +20,10 @@ struct SplitName {
 
 /// All numbers that no axis has are axis_count.
 SplitName split(std::string_view name) {
-  const auto [word, rest] = base::split_axis(name);
+  const auto [word, rest, digits] = base::split_axis(name);
   if (word.empty()) return {std::nullopt, name};
   std::size_t axis = 0;
-  for (const char digit : word.substr(4))
+  for (const char digit : digits)
     axis = std::min(axis_count, axis * 10 + static_cast<std::size_t>(digit - '0'));
   return {axis, rest};
 }

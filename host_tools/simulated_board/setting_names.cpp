@@ -42,7 +42,7 @@ bool is_parameter(std::string_view name) {
 
 NamedSetting resolve_setting(std::string_view name) {
   if (name.starts_with(parameters_prefix)) return parameter_setting(name.substr(parameters_prefix.size()));
-  const auto [axis, bare] = base::split_axis(name);
+  const auto [axis, bare, digits] = base::split_axis(name);
   if (const SceneKey* key = scene_key(bare, !axis.empty()))
     return {std::string(base::without_axis_0(name)), key->unit, key->type == SceneValue::number};
   if (is_parameter(name)) return parameter_setting(name);

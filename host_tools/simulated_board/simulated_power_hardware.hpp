@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <stdexcept>
 
 #include "board/power/power.hpp"
 #include "drivers/drv8301_registers.hpp"

@@ -14,9 +14,10 @@
 // velocities.
 //
 // Proofs (chain_coefficients.hpp), where J is the largest jerk that the energy of the derivative allows and h
-//   the interval: no stop        both ends have the same sign and min(|v(0)|, |v(h)|) > J h^2 / 8: a curve
-//                  deviates from its chord by no more; or ||v(h)| - |v(0)|| > J h^2 / 2: it rises from its
-//                  smaller end from the start
+// the interval:
+//   no stop        both ends have the same sign and min(|v(0)|, |v(h)|) > J h^2 / 8: a curve deviates from
+//                  its chord by no more; or ||v(h)| - |v(0)|| > J h^2 / 2: it rises from its smaller end from
+//                  the start
 //   one reversal   the ends have different signs and |v'(0)| > 2 J h, so v is monotone with its only zero at
 //                  tau. The motion goes on backwards if m_0 |v'(tau)| > 2 f_c, and does not turn round again
 //                  if the deceleration left, |v'(tau)| - 2 f_c/m_0, is above J (h - tau)/2. Friction then

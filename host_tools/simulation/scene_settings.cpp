@@ -18,7 +18,7 @@ constexpr std::string_view parameters_name = "parameters";
 
 // "axis1" of "axis1.device.mass", which then is the rest.
 std::optional<std::string> take_axis(std::string_view& name) {
-  const auto [axis, rest] = base::split_axis(name);
+  const auto [axis, rest, digits] = base::split_axis(name);
   name = rest;
   if (axis.empty() || axis == "axis0") return std::nullopt;
   return std::string(axis);

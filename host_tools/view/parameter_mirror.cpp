@@ -11,19 +11,22 @@ namespace kmax::view {
 using device::Parameter;
 
 namespace {
-/// What the page shows, and what its verdict and curve are made of: those of one group, which may be one
-/// request, beside each other.
+/// Whole groups, which may be one request each: those of what the page shows, and of what its verdict is made
+/// of. Its curve has no others.
 const std::vector<Parameter>& followed() {
   static const std::vector<Parameter> all = [] {
-    std::vector<Parameter> some = shown_parameters();
+    std::vector<Parameter> seeds = shown_parameters();
     for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) {
-      for (const Parameter& judged : check::parameters_of_case(axis)) some.push_back(judged);
+      for (const Parameter& judged : check::parameters_of_judgement(axis)) seeds.push_back(judged);
     }
-    const auto by_slot = [](const Parameter& parameter) { return parameter.slot(); };
-    std::ranges::sort(some, {}, by_slot);
-    const auto twice = std::ranges::unique(some, {}, by_slot);
-    some.erase(twice.begin(), twice.end());
-    return some;
+    std::vector<Parameter> groups;
+    for (const Parameter& one : device::persistent_parameters()) {
+      const auto index = one.index();
+      if (std::ranges::any_of(seeds, [index](const Parameter& seed) { return seed.index() == index; }))
+        groups.push_back(one);
+    }
+    std::ranges::stable_sort(groups, {}, [](const Parameter& parameter) { return parameter.index(); });
+    return groups;
   }();
   return all;
 }

@@ -207,7 +207,8 @@ def whole_phrases(tree):
             if scrap.match(line) and literal.match(before) and literal.match(after) and "\\n" not in before + line:
                 yield path, f"{path}:{number}: {line.strip()} alone"
             one, short, hanging = remark.match(before), remark.match(line), remark.match(after)
-            if (one and short and hanging and len(before) >= 92 and len(short[3]) < 20
+            # Of a list or of a table's row; what follows prose at a deeper place is a formula.
+            if (one and short and hanging and re.search(r"^[-*] |\S {2}", one[3]) and len(before) >= 92 and len(short[3]) < 20
                     and len(hanging[2]) > len(short[2]) == len(one[2])):
                 yield path, f"{path}:{number}: {line.strip()} alone"
 
@@ -349,7 +350,8 @@ class EachRuleSees(unittest.TestCase):
         self.good(whole_phrases, "control/a.cpp", full + full + '  "b");\n')
         self.bad(whole_phrases, "control/a.cpp", full + '  "may "\n' + full)
         self.good(whole_phrases, "control/a.cpp", "// - " + 90 * "a" + "\n//   was\n//   b\n")
-        self.bad(whole_phrases, "control/a.cpp", "//   " + 90 * "a" + "\n//   was\n//     b\n")
+        self.good(whole_phrases, "control/a.cpp", "// " + 95 * "a" + "\n// was\n//   b = c\n")
+        self.bad(whole_phrases, "control/a.cpp", "//   * " + 90 * "a" + "\n//   was\n//     b\n")
 
     def test_namespaces(self):
         self.good(namespaces, "host_tools/device/can/a.hpp", "namespace kmax::device {\n")

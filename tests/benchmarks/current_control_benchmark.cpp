@@ -1,5 +1,6 @@
 // The current controllers: what they promise against what they do, and what that costs. Prints
-//   docs/current_control.md. current_control_benchmark --instructions FILE [--picture FILE.svg]
+// docs/current_control.md.
+//   current_control_benchmark --instructions FILE [--picture FILE.svg]
 // FILE is what tests/benchmarks/instruction_budget/instruction_budget.sh printed. The picture is drawn by
 // gnuplot. Exit code 1 when a file cannot be read or written or gnuplot fails, 2 on wrong usage.
 

@@ -388,9 +388,13 @@ report::Section noticed_section(const SubjectSet& set, const std::vector<Baselin
     table.rows.push_back({result.law.name, cell(result.moves, 1), cell(result.feels, 2),
                           cell(result.notices, 3), fine == finer.end() ? "-" : cell(fine->second, 4)});
   }
-  const auto times = [](const PeopleMean& most, const PeopleMean& plain) {
-    return plain.mean > 0.0 ? fmt::format("{:.1f} times the plain wall", most.mean / plain.mean)
-                            : std::string("where the plain wall holds none");
+  const auto more_than = [](const PeopleMean& found) {
+    return found.ends.beyond_last > 0 ? "more than " : "";
+  };
+  const auto times = [&](const PeopleMean& most, const PeopleMean& plain) {
+    return plain.mean > 0.0
+               ? fmt::format("{}{:.1f} times the plain wall", more_than(most), most.mean / plain.mean)
+               : std::string("where the plain wall holds none");
   };
   const auto by_mean = [](const PeopleMean& found) { return found.mean; };
   const BaselineResult& most = *std::ranges::max_element(
@@ -412,9 +416,9 @@ report::Section noticed_section(const SubjectSet& set, const std::vector<Baselin
           "wall holds {} N/mm, and {} the most of these walls, {}: {}. With counts of {:g} um, where that "
           "begins at {} N/mm, {} holds {}, {}.",
           count * 1e6, band, flickers(count), n_per_mm(results.front().notices.mean),
-          n_per_mm(most.notices.mean), most.law.name, times(most.notices, results.front().notices),
-          finer_count * 1e6, flickers(finer_count), most_finer.first,
-          (most_finer.second.ends.beyond_last > 0 ? "more than " : "") + n_per_mm(most_finer.second.mean),
+          more_than(most.notices) + n_per_mm(most.notices.mean), most.law.name,
+          times(most.notices, results.front().notices), finer_count * 1e6, flickers(finer_count),
+          most_finer.first, more_than(most_finer.second) + n_per_mm(most_finer.second.mean),
           times(most_finer.second, finer.front().second))};
   section.tables.push_back(std::move(table));
   for (std::string& note : marks.notes()) section.paragraphs.push_back(std::move(note));

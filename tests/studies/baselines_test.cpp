@@ -175,6 +175,9 @@ TEST(NoticedSection, SaysWhatIsLeftByWhatPeopleNotice) {
                   "7.50 the most of these walls, " + results[6].law.name + ": 2.5 times the plain wall");
   EXPECT_CONTAINS(said, "at 38.18 N/mm, " + results[6].law.name + " holds 20.00, 5.0 times the plain wall");
   EXPECT_NO_THROW(report::require_rectangular(section.tables[0]));
+  finer[1].second.ends.beyond_last = 1;
+  EXPECT_CONTAINS(paragraphs_of(noticed_section(set, results, finer)),
+                  "holds more than 20.00, more than 5.0 times the plain wall");
   set.device.force_limit = 0.0;
   EXPECT_NEAR(noticed_force(set), 0.07 * 3.3, 1e-12);
   results[0].notices = mean_of(0.0);

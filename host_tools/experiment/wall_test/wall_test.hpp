@@ -11,9 +11,9 @@
 // last second, which is judged, by two criteria:
 //
 //   position  unstable if it moves by more than 0.165 mm in every quarter of that second
-//   (contact_measure.hpp) force     unstable if it swings by more than 1 N in every quarter: a stiff wall on
-//             a coarse encoder swings by newtons, which a hand feels, while the handle moves by less than
-//             three counts
+//             (contact_measure.hpp)
+//   force     unstable if it swings by more than 1 N in every quarter: a stiff wall on a coarse encoder
+//             swings by newtons, which a hand feels, while the handle moves by less than three counts
 //
 // Neither paper gives a measure; both criteria are this project's. A touch is stable if it is by both. A
 // handle that was let go and has left the wall is stable: nothing of the wall moves it.

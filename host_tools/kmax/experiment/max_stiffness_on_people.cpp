@@ -113,6 +113,11 @@ MaxStiffnessStudy run_study(Context& context, const MaxStiffnessOptions& options
   run.steps.first = options.start.value_or(run.steps.first);
   run.steps.first_adaptive = options.start_adaptive;
   run.steps.goes_down = options.start || options.start_adaptive;
+  for (const auto& condition : conditions) {
+    if (run.steps.last < run.steps.first_of(condition.adaptive()))
+      throw UsageError(fmt::format("the first stiffness of '{}' is {} N/m: at most {} is allowed",
+                                   condition.name, run.steps.first_of(condition.adaptive()), run.steps.last));
+  }
   if (options.calibrate) {
     run.progress = reporter(progress, interruption, "calibrating, " + experiment::clip_words(set.device), 0);
     experiment::CalibrationSettings settings = experiment::paper_targets();

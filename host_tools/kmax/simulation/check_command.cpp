@@ -3,8 +3,10 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <tuple>
 
 #include "firmware/parameters/parameter_rules.hpp"
+#include "host_tools/base/axis_name.hpp"
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/numbers.hpp"
@@ -65,23 +67,30 @@ struct Settings {
   check::Structure structure;
 };
 
+/// "axis7" of a device that has fewer is nobody's.
+void require_axis(std::string_view named, const std::string& text) {
+  for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+    if (named == fmt::format("axis{}", axis)) return;
+  throw UsageError(
+      fmt::format("--set {}: there is no {}; the axes are 0 to {}", text, named, firmware::axis_count - 1));
+}
+
 /// A structure is read as that of simulated touches is ('kmax experiment'); what is not set of it has its
 /// default. UsageError or base::ValueError.
 Settings settings_of(Context& context, const CheckOptions& options) {
   Settings settings;
   std::vector<std::string> of_structure;
   for (const std::string& text : options.assignments) {
-    std::string_view name = base::trimmed(text);
-    const std::size_t dot = name.find('.');
-    const bool on_axis = name.starts_with("axis") && dot != std::string_view::npos;
-    const std::string_view axis = on_axis ? name.substr(0, dot) : std::string_view();
-    if (on_axis) name.remove_prefix(dot + 1);
-    if (!name.starts_with("structure.")) {
+    const auto [axis, bare, digits] = base::split_axis(base::trimmed(text));
+    if (!bare.starts_with("structure.")) {
       settings.of_parameters.push_back(text);
-    } else if (on_axis && axis != fmt::format("axis{}", context.axis())) {
+    } else if (!axis.empty() && axis != fmt::format("axis{}", context.axis())) {
+      // Refused if it is none.
+      std::ignore = touch_changes(std::vector{std::string(bare)}, experiment::Touching::set_of_people);
+      require_axis(axis, text);
       context.note(fmt::format("{} is not judged by any criterion of axis {}", text, context.axis()));
     } else {
-      of_structure.emplace_back(name);
+      of_structure.emplace_back(bare);
     }
   }
   if (!of_structure.empty())
@@ -94,7 +103,7 @@ Settings settings_of(Context& context, const CheckOptions& options) {
 
 /// A side of a map; what is no parameter of the device has one value all over it.
 MapAxis map_side(const std::string& text, std::size_t axis) {
-  if (base::trimmed(text).starts_with("structure."))
+  if (base::split_axis(base::trimmed(text)).rest.starts_with("structure."))
     throw UsageError(fmt::format(
         "--map {}: a map's sides are parameters of the device; give the structure with --set, and it is the "
         "same at every point of the map",
@@ -110,8 +119,7 @@ std::size_t slot_of(const Parameter& parameter) {
 firmware::ParameterValues values_of(Context& context, const std::vector<std::string>& settings,
                                     const std::vector<MapAxis>& sides) {
   const auto assignments = device::parse_assignments(settings, context.axis());
-  std::vector<Parameter> read = check::parameters_of_case(context.axis());
-  read.push_back(Parameter::of<"velocity.estimator">(context.axis()));  // what the guarantees cover
+  std::vector<Parameter> read = check::parameters_of_judgement(context.axis());
   for (const auto& assignment : assignments) {
     if (std::find(read.begin(), read.end(), assignment.parameter) == read.end())
       context.note(fmt::format("{} is not judged by any criterion of axis {}", assignment.parameter.name(),

@@ -8,6 +8,7 @@
 #include "firmware/modbus/crc.hpp"
 #include "firmware/parameters/parameter_values.hpp"
 #include "firmware/parameters/refusal.hpp"
+#include "host_tools/device/serial/identification_reply.hpp"
 
 namespace kmax::virtual_board {
 
@@ -30,8 +31,9 @@ std::vector<std::uint8_t> BoardLink::exchange(std::span<const std::uint8_t> requ
 }
 
 std::vector<std::uint8_t> BoardLink::exchange_once(std::span<const std::uint8_t> request) {
-  // An answer to a write repeats the first registers and their number; one to a reading has the registers.
-  const std::size_t expected = request[1] == 16 ? 8 : 5U + 2U * request[5];
+  // An answer to a write repeats the first registers and their number; one to a reading has the registers,
+  // and one to the question who it is says itself how long it is.
+  std::size_t expected = request[1] == 16 ? 8 : 5U + 2U * request[5];
   static_cast<void>(board_.transmitted());
   board_.receive(request);
   std::vector<std::uint8_t> reply;
@@ -40,6 +42,10 @@ std::vector<std::uint8_t> BoardLink::exchange_once(std::span<const std::uint8_t>
     board_.run_for(0.0001);
     const auto bytes = board_.transmitted();
     reply.insert(reply.end(), bytes.begin(), bytes.end());
+    if (request[1] == device::identification::function) {
+      const std::size_t length = device::identification::frame_length(reply);  // 0: not known yet
+      expected = length == 0 ? reply.size() + 1 : length;
+    }
     const bool refused = reply.size() >= 2 && (reply[1] & 0x80U) != 0;
     if (reply.size() < (refused ? 5U : expected)) continue;
     if (firmware::modbus::crc_of(reply) != 0) throw device::LinkError("the board's reply has a wrong CRC");

@@ -217,6 +217,39 @@ TEST(ParameterCase, TheListedParametersAreThoseThatCount) {
   }
 }
 
+/// What a judgement says beside its numbers, as the parameters change.
+TEST(ParametersOfJudgement, AreAllThatItsWordsDependOn) {
+  const auto words_of_judgement = [](const ParameterValues& values) {
+    const Judgement judgement = judge_parameters(values, 1, {});
+    return std::array{judgement.follows_velocity, judgement.uncovered_damper, judgement.grows};
+  };
+  const auto listed = parameters_of_judgement(1);
+  for (const device::Parameter& parameter : parameters_of_case(1))
+    EXPECT_EQ(std::count(listed.begin(), listed.end(), parameter), 1) << parameter.name();
+  std::size_t found = 0;
+  for (const device::Parameter& parameter : device::all_parameters()) {
+    if (!parameter.writable()) continue;
+    const firmware::Entry& entry = parameter.definition();
+    bool changes = false;
+    for (const std::int32_t window : {0, 1, 16}) {
+      ParameterValues values;
+      values.set_real<"wall.damping">(2.0F, 1);
+      values.set_whole<"wall.damping_window">(window, 1);
+      for (const double number : {entry.minimum, 0.25 * entry.maximum, entry.maximum, 1.0, 2.0, 500.0}) {
+        if (number < entry.minimum || number > entry.maximum) continue;
+        ParameterValues changed = values;
+        changed.set_raw(parameter.slot(), firmware::raw_from_number(entry.type, std::trunc(number)));
+        changes = changes || words_of_judgement(values) != words_of_judgement(changed);
+      }
+    }
+    found += changes ? 1 : 0;
+    if (changes) {
+      EXPECT_NE(std::find(listed.begin(), listed.end(), parameter), listed.end()) << parameter.name();
+    }
+  }
+  EXPECT_GE(found, 5U) << "law, damping and its window, estimator, growth";
+}
+
 // The device's own check before arming must not be of another case than the one that is explained here.
 RC_GTEST_PROP(ParameterCase, TheFirmwaresGuardJudgesTheSameCase, ()) {
   ParameterValues values;

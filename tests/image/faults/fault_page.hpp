@@ -68,6 +68,7 @@ inline void expect_on_page(const std::string& name, const std::string& row, cons
 /// Of the table that ends there, without its heading.
 inline std::size_t rows_on_page(const std::string& end) {
   std::string text = fault_page_detail::read_page();
+  EXPECT_NE(text.find(end), std::string::npos) << end;
   text = text.substr(0, text.find(end));
   // Behind the table before.
   const std::size_t begin = text.rfind("<!-- end of ");

@@ -108,6 +108,7 @@ TEST(StiffnessClimb, OfAnAdaptiveLawBeginsAtItsOwnStart) {
   const StiffnessSteps steps{.first = 3000, .last = 4000, .first_adaptive = 5000};
   EXPECT_EQ(StiffnessClimb(steps, false).next(), 3000);
   EXPECT_THROW(StiffnessClimb(steps, true), std::invalid_argument);
+  EXPECT_EQ(StiffnessClimb({.first = 3000, .last = 8000, .first_adaptive = 5000}, true).next(), 5000);
 }
 
 TEST(StiffnessClimb, GrowsByAShareWhereThatIsTheLongerStep) {

@@ -1,7 +1,6 @@
 // The scene on the virtual board's connectors, and the same scene on the native board: one physical world,
 // sampled and driven at the same instants, gives the same codes.
 #include "host_tools/virtual_board/odrive_v3/scene_world.hpp"
-#include "host_tools/simulation/converter_code.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,6 +11,7 @@
 #include "board/odrive_v3/description.hpp"
 #include "host_tools/simulated_board/simulated_board.hpp"
 #include "host_tools/simulated_board/simulated_power_hardware.hpp"
+#include "host_tools/simulation/converter_code.hpp"
 
 namespace kmax::virtual_board::scene_world_test {
 
