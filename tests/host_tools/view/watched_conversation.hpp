@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -74,6 +75,10 @@ class WatchedLink final : public device::Link {
   std::vector<std::uint32_t> read_log_entry(std::size_t place) override {
     watched_.request("read");
     return watched_.device.read_log_entry(place);
+  }
+  std::map<std::string, std::string> identify() override {
+    watched_.request("read");
+    return watched_.device.identify();
   }
   std::chrono::microseconds now() const override { return watched_.device.now(); }
   void wait(std::chrono::microseconds duration) override {
