@@ -16,7 +16,7 @@ using std::chrono::milliseconds;
 
 namespace {
 // As for a save.
-constexpr milliseconds patience{10'000};
+constexpr milliseconds lock_patience{10'000};
 constexpr milliseconds poll_interval{20};
 
 std::string wrong_codes(std::uint32_t count) {
@@ -57,17 +57,17 @@ void Lock::write(const Parameter& parameter, std::uint32_t value, LockState want
   Store store(device_);
   StoreState store_state = store.status().state;
   while (store_state == StoreState::busy) {
-    if (device_.link().now() - start > patience)
+    if (device_.link().now() - start > lock_patience)
       throw base::DeviceError(
           fmt::format("{}: the device is still writing its memory after {} s; 'kmax info' tells "
                       "what comes of it",
-                      what, patience.count() / 1000));
+                      what, lock_patience.count() / 1000));
     device_.link().wait(poll_interval);
     store_state = store.status().state;
   }
   // The lock follows the memory in the device's next round.
   LockStatus now = status();
-  for (; now.state != wanted && lost.empty() && device_.link().now() - start < patience; now = status()) {
+  for (; now.state != wanted && lost.empty() && device_.link().now() - start < lock_patience; now = status()) {
     if (store_state == StoreState::failed) break;
     device_.link().wait(poll_interval);
   }
