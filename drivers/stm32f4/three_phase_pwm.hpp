@@ -29,7 +29,7 @@
 //     a `disarm` from an interrupt just before the store is undone by it.
 //   * A failing crystal: the clock security system's break (BKE = 1) clears MOE in hardware.
 //   * BKP = 1 (break when high). No pin is mapped to BKIN here, and an alternate-function input without a pin
-//     is taken to read low. The manual does not say so: where it reads high, `break_is_held` tells, and
+//     is taken to read low. The manual does not say so: where it reads high, `break_is_held` says so, and
 //     `break_when_low` turns BKP round, after a reset of the timer, since LOCK has frozen it.
 //   * LOCK level 2 freezes dead time, idle levels, polarities and break set-up until reset, so that a stray
 //     store cannot short a leg. `configure` may be repeated with the same dead time only, else it fails.

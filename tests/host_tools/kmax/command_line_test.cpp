@@ -92,7 +92,7 @@ TEST_F(CommandLine, CanopensOwnSettingsAreNotSetHere) {
 }
 
 TEST_F(CommandLine, ExitCodesTellWhoseFaultItIs) {
-  EXPECT_EQ(kmax({"set", "haptic.rate=333"}), base::wrong_usage);  // only the device can tell
+  EXPECT_EQ(kmax({"set", "haptic.rate=333"}), base::wrong_usage);  // only the device knows
   EXPECT_EQ(kmax({"get", "wall.stifness"}), base::wrong_usage);
   EXPECT_EQ(kmax({"get", "wall.law", "--device", "tcp:x"}), base::wrong_usage);
   EXPECT_EQ(kmax({"arm", "--axis", "2"}), base::wrong_usage);

@@ -20,7 +20,7 @@ struct Cause {
   Hits hits;
   firmware::Fault fault;      ///< of an armed axis; none: nothing can notice it
   double ticks;               ///< from the cause to the bridge's end
-  firmware::Refusal refusal;  ///< of arming while it lasts; none: nothing tells before current flows
+  firmware::Refusal refusal;  ///< of arming while it lasts; none: nothing shows it before current flows
 
   enum class Ends : std::uint8_t {
     when_mended,
