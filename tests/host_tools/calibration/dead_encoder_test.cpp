@@ -1,5 +1,11 @@
+#include <fmt/format.h>
+
+#include <set>
+#include <utility>
+
 #include "tests/host_tools/calibration/calibrated_device.hpp"
 #include "tests/in_a_soak.hpp"
+#include "tests/shared_beginning.hpp"
 
 namespace kmax::calibration_test::dead_encoder_test {
 
@@ -14,7 +20,7 @@ struct Course {
   double afterwards = 0.0;  // m from where the defect came up
 };
 
-/// Asked at each report of progress until it says that the defect comes up now.
+/// Asked before the calibration and at each report of progress until it says that the defect comes up now.
 using Moment = std::function<bool(CalibratedDevice&)>;
 
 Course course_of(const std::string& scene, const CalibrationSettings& settings, const Moment& comes_up) {
@@ -49,11 +55,6 @@ Course course_of(const std::string& scene, const CalibrationSettings& settings, 
   return course;
 }
 
-/// `whole`: counted in reports of progress; 0: from the beginning.
-Moment at_report(int whole) {
-  return [whole](CalibratedDevice& device) { return device.length.whole >= whole; };
-}
-
 /// The record is complete and its excitation still runs.
 bool runs_after_its_record(CalibratedDevice& device) {
   firmware::Application& application = device.link().simulation().board().application();
@@ -65,30 +66,37 @@ bool runs_after_its_record(CalibratedDevice& device) {
              static_cast<std::uint32_t>(firmware::DriveMode::excitation);
 }
 
-/// In the tail number `tail`, from 1, of those that reports of progress fall into, of the waves that shake a
-/// handle.
-class InTail {
+/// The beginnings of the tails, into which reports of progress fall, of the waves that shake a handle.
+class BeginningOfTail {
  public:
-  explicit InTail(int tail) : left_(tail) {}
   bool operator()(CalibratedDevice& device) {
     const bool shakes = device.step == "torque_constant" || device.step == "motion";
     const bool inside = shakes && runs_after_its_record(device);
-    if (inside && !inside_) --left_;
-    inside_ = inside;
-    return inside && left_ == 0;
+    const bool before = std::exchange(inside_, inside);
+    return inside && !before;
   }
-  int left() const { return left_; }
 
  private:
-  int left_;
   bool inside_ = false;
 };
 
-int tails_of(const std::string& scene, const CalibrationSettings& settings) {
-  constexpr int many = 100000;
-  InTail seen(many);
-  course_of(scene, settings, std::ref(seen));
-  return many - seen.left();
+/// The defect comes up at each of `moments` of one calibration, in a copy of the process, where `judge` is
+/// told of the course and of the report of progress; without it everything passes. Returns how many moments
+/// there were.
+std::size_t plant_at_each(const std::string& scene, const Moment& moments,
+                          const std::function<void(const Course&, int)>& judge) {
+  std::size_t copies = 0;
+  SharedBeginning::run([&](SharedBeginning& beginning) {
+    int report = 0;
+    const Course course = course_of(scene, {}, [&](CalibratedDevice& device) {
+      report = device.length.whole;
+      return moments(device) && beginning.fork(fmt::format("at report {}", report));
+    });
+    if (beginning.in_copy()) return judge(course, report);
+    EXPECT_EQ(course.cause, "") << "nothing is planted";
+    copies = beginning.copies();
+  });
+  return copies;
 }
 
 class DeadEncoder : public testing::TestWithParam<const char*> {};
@@ -96,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, DeadEncoder, testing::ValuesIn(representative_s
 
 TEST_P(DeadEncoder, FromTheBeginningThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
-  const Course course = course_of(GetParam(), settings, at_report(0));
+  const Course course = course_of(GetParam(), settings, [](CalibratedDevice&) { return true; });
   EXPECT_EQ(course.cause, "encoder_dead");
   EXPECT_LE(course.farthest, 2.0 * settings.travel);
 }
@@ -107,36 +115,34 @@ TEST_P(DeadEncoder, InTheMiddleThrowsTheHandleNowhere) {
   // Which report of progress it is decides what the handle was doing: a few points prove nothing. Three
   // found 90 mm where 200 found 317.
   const int points = in_a_soak() ? 200 : 16;
+  std::set<int> reports;
+  for (int point = 1; point < points; ++point) reports.insert(whole * point / points);
+  const auto due = [&](CalibratedDevice& device) { return reports.contains(device.length.whole); };
   // The trip level of the travel sees nothing: what bounds the motion is the plan of each excitation, and the
   // shorted winding after it.
   // 62 mm was the farthest of 600 moments of three synchronous motors' calibrations, with a travel of 20 mm.
   const double farthest = 4.0 * settings.travel;
-  for (int point = 1; point < points; ++point) {
-    const int at = whole * point / points;
-    const Course course = course_of(GetParam(), settings, at_report(at));
+  const std::size_t planted = plant_at_each(GetParam(), due, [&](const Course& course, int at) {
     // A dead encoder cannot always be distinguished from a blocked motor or a slipping encoder by then. When
     // the last samples are fetched there is nothing left that it could spoil.
     if (course.afterwards > 0.002) {
       EXPECT_NE(course.cause, "") << "at " << at << " of " << whole;
     }
     EXPECT_LE(course.farthest, farthest) << course.cause << " at " << at << " of " << whole;
-  }
+  });
+  EXPECT_EQ(planted, points - 1U);
 }
 
 // What was recorded is sound, and the next wave begins under a dead encoder.
 TEST_P(DeadEncoder, BetweenARecordAndTheEndOfItsExcitationThrowsTheHandleNowhere) {
   const CalibrationSettings settings;
-  const int tails = tails_of(GetParam(), settings);
-  ASSERT_GT(tails, 5);
-  for (int tail = 1; tail <= tails; ++tail) {
-    const Course course = course_of(GetParam(), settings, InTail(tail));
-    ASSERT_TRUE(course.planted) << tail << " of " << tails;
+  const std::size_t tails = plant_at_each(GetParam(), BeginningOfTail(), [&](const Course& course, int at) {
     if (course.afterwards > 0.002) {
-      EXPECT_NE(course.cause, "") << "in tail " << tail << " of " << tails;
+      EXPECT_NE(course.cause, "") << "in the tail at report " << at;
     }
-    EXPECT_LE(course.farthest, 4.0 * settings.travel)
-        << course.cause << " in tail " << tail << " of " << tails;
-  }
+    EXPECT_LE(course.farthest, 4.0 * settings.travel) << course.cause << " in the tail at report " << at;
+  });
+  EXPECT_GT(tails, 5U);
 }
 
 }  // namespace kmax::calibration_test::dead_encoder_test
