@@ -168,7 +168,9 @@ step('SDO abort: read only', () => refused('1000h', abort.readOnly, set(0x1000, 
 function pattern(size, start) {
   return Buffer.from(Array.from({ length: size }, (_, i) => (i * 37 + (i >> 8) + start) & 0xff));
 }
-for (const size of [1, 7, 8, 889, 890, 2000]) {
+// One byte, one segment, one more; as many segments as the master takes at once, one more, and several times as many.
+const atOnce = 7 * Number(segmentsAtOnce);
+for (const size of [1, 7, 8, atOnce, atOnce + 1, Math.floor(2.25 * atOnce)]) {
   for (const block of [false, true]) {
     const kind = block ? 'block' : size > 4 ? 'segmented' : 'expedited';
     step(`SDO ${kind}, ${size} byte${size > 1 ? 's' : ''}`, async () => {
