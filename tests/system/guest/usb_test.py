@@ -176,8 +176,7 @@ class OnACable(Cable):
             bus.bind((first,))
             bus.settimeout(PATIENCE)
             answers = 0
-            # More than any of the rings between them has places.
-            for number in range(100):
+            for number in range(300):
                 bus.send(struct.pack("=IB3x8s", 0x601, 8, bytes.fromhex("4000100000000000")))
                 while True:
                     identifier, length, data = struct.unpack("=IB3x8s", bus.recv(16))
@@ -185,7 +184,7 @@ class OnACable(Cable):
                         break
                 answers += 1
                 self.assertEqual(data[:4], bytes.fromhex("43001000"), number)
-            self.assertEqual(answers, 100)
+            self.assertEqual(answers, 300)
 
     def test_pulled_out_while_armed_the_force_is_gone_and_it_comes_back(self):
         device = f"serial:{TERMINAL}"
