@@ -337,7 +337,7 @@ void kmax::drivers::cortex_m::enter_safe_state() {
 
 void ISR_adc() {
   using namespace kmax::board;
-  odrive_v3::ISR_tick(*power, *application);
+  odrive_v3::ISR_tick(*power, application->ISR_axes());
 }
 
 void ISR_exti2() {

@@ -127,7 +127,7 @@ class PowerHardware {
 };
 
 /// The conversions' interrupt. In a file of its own, compiled for speed.
-void ISR_tick(Power<PowerHardware>& power, firmware::Application& application);
+void ISR_tick(Power<PowerHardware>& power, firmware::Application::Tick& axes);
 /// A tick of all axes without encoders and power stage.
 void tick_without_power(firmware::Application& application);
 

@@ -38,8 +38,8 @@ class Power {
   Hardware& hardware() { return drives_.hardware(); }
   const Hardware& hardware() const { return drives_.hardware(); }
 
-  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, firmware::Application& application) {
-    drives_.ISR_tick(axis, application, stage_);
+  [[gnu::always_inline]] inline void ISR_tick(std::size_t axis, firmware::Application::Tick& axes) {
+    drives_.ISR_tick(axis, axes, stage_);
   }
   /// The two parts of ISR_tick(), for a board in which all axes are sampled together.
   firmware::AxisInput ISR_measure(std::size_t axis) {
