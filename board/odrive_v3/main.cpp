@@ -7,23 +7,27 @@
 #include <optional>
 #include <span>
 
-#include "board/odrive_v3/can_line.hpp"
+#include "board/links/can_link.hpp"
+#include "board/links/serial_link.hpp"
+#include "board/links/usb_link.hpp"
 #include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/pins.hpp"
 #include "board/odrive_v3/power_hardware.hpp"
 #include "board/odrive_v3/priorities.hpp"
-#include "board/odrive_v3/serial_line.hpp"
-#include "board/odrive_v3/usb_line.hpp"
 #include "board/odrive_v3/voltage_variant.hpp"
 #include "board/stm32f405/boot_loader.hpp"
+#include "board/stm32f405/can_hardware.hpp"
 #include "board/stm32f405/crash_record.hpp"
 #include "board/stm32f405/memory_rights.hpp"
+#include "board/stm32f405/serial_hardware.hpp"
 #include "board/stm32f405/unique_id.hpp"
+#include "board/stm32f405/usb_hardware.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
 #include "drivers/periodic_timer.hpp"
+#include "drivers/stm32f4/clock_tree.hpp"
 #include "drivers/stm32f4/external_interrupt.hpp"
 #include "drivers/stm32f4/flash_sectors.hpp"
 #include "drivers/stm32f4/independent_watchdog.hpp"
@@ -75,11 +79,11 @@ ParameterFlash parameter_flash{stm32::flash(), {{{1, parameter_sector(0)}, {2, p
 [[gnu::section(".noinit")]] firmware::RetainedCount boot_loader_asked;
 
 [[gnu::section(".ccm")]] std::optional<firmware::Application> application;
-/// Raised by the lines' interrupts: they have left something for the main loop.
-firmware::InterruptSignal lines_due;
-std::optional<SerialLine> serial;
-std::optional<CanLine> can_line;
-std::optional<UsbLine> usb_line;
+/// Raised by the links' interrupts: they have left something for the main loop.
+firmware::InterruptSignal links_due;
+std::optional<SerialLink<SerialHardware<stm32::Interrupt::usart2>>> serial_link;
+std::optional<CanLink<CanHardware>> can_link;
+std::optional<UsbLink<UsbHardware, cortex::SystemTick<>>> usb_link;
 ChipBus chip_bus{stm32::spi3()};
 /// Made in main, once the clocks are known; no interrupt is enabled before. DMA reads of it.
 std::optional<Power<PowerHardware>> power;
@@ -248,20 +252,20 @@ void tick_without_power() {
   if (!system_tick.start(clocks.core_hz, clock_rate_hz)) cortex::stop_on_unexpected_interrupt();
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Usart2::mask);
   apply(serial_pins);
-  serial.emplace(interrupts, clocks.apb1_hz);
-  serial->start(application->serial());
+  serial_link.emplace(stm32::usart2(), interrupts, clocks.apb1_hz);
+  serial_link->start(application->serial());
   stm32::enable_peripheral_clock(stm32::rcc().apb1enr, stm32::rcc_apb1enr::Can1::mask);
   apply(can_pins);
   // The internal oscillator is off by more than a bus allows (clock_tree.hpp): without the crystal no bit
   // rate can be made.
   const bool good_clock = clocks.source == stm32::ClockSource::crystal_pll;
-  can_line.emplace(interrupts, good_clock ? clocks.apb1_hz : 0);
+  can_link.emplace(interrupts, good_clock ? clocks.apb1_hz : 0);
   // Nor 48 MHz as USB wants them.
   stm32::enable_peripheral_clock(stm32::rcc().ahb2enr, stm32::rcc_ahb2enr::OtgFs::mask);
   apply(usb_pins);
-  usb_line.emplace(interrupts, application->usb(), system_tick, usb_identity(serial_number_from_unique_id()),
-                   clocks.apb1_hz, boot_loader_is_safe(otp_byte));
-  if (good_clock) usb_line->start();
+  usb_link.emplace(application->usb(), system_tick, usb_identity(serial_number_from_unique_id()),
+                   clocks.apb1_hz, boot_loader_is_safe(otp_byte), interrupts);
+  if (good_clock) usb_link->start();
 
   // Ticks, timings and gains are those of 168 MHz. On a slower clock there is no power stage, and the axes
   // say that they have no encoder.
@@ -274,21 +278,21 @@ void tick_without_power() {
 /// A host is at the USB connector, or just has been.
 [[gnu::cold, gnu::noinline]] void poll_usb() {
   usb_interrupted = false;
-  usb_line->poll(*application, *can_line);
-  if (!usb_line->boot_loader_wanted(*application)) return;
-  usb_line->disconnect();
+  usb_link->poll(*application, *can_link);
+  if (!usb_link->boot_loader_wanted(*application)) return;
+  usb_link->disconnect();
   boot_loader_asked.set(asks_for_boot_loader);
   restart();
 }
 
 void poll() {
   const std::uint32_t now = system_tick.now_us();
-  can_line->poll(application->can(), now);
+  can_link->poll(application->can(), now);
   application->poll(now);
-  if (usb_line->due()) [[unlikely]]
+  if (usb_link->due()) [[unlikely]]
     poll_usb();
-  can_line->send(application->can());
-  serial->poll(application->serial(), now);
+  can_link->send(application->can());
+  serial_link->poll(application->serial(), now);
   if (application->can().restart_wanted()) restart();
   if (power_runs) poll_power(now);
 }
@@ -298,10 +302,10 @@ void poll() {
   while (!power_runs) {
     tick_without_power();
     poll();
-    if (!lines_due.take()) sleep();
+    if (!links_due.take()) sleep();
   }
   for (;;) {
-    bool due = lines_due.take();
+    bool due = links_due.take();
     due = power->drives().main_loop_due() || due;
     // What has come meanwhile does not wait; what comes between the look above and the sleep does, for the
     // next interrupt, at most half a tick, and in the loop without ticks a millisecond.
@@ -314,9 +318,9 @@ void poll() {
 }
 
 void ISR_receive_can(unsigned fifo) {
-  can_line->ISR_receive(fifo, application->can(),
-                        [](const drivers::CanFrame& frame) { usb_line->ISR_bus_frame(frame); });
-  lines_due.ISR_raise();
+  can_link->ISR_receive(fifo, application->can(),
+                        [](const drivers::CanFrame& frame) { usb_link->ISR_bus_frame(frame); });
+  links_due.ISR_raise();
 }
 
 }  // namespace
@@ -361,8 +365,8 @@ void ISR_system_tick() {
 }
 
 void ISR_can1_tx() {
-  kmax::board::can_line->ISR_serve_transmit();
-  kmax::board::lines_due.ISR_raise();
+  kmax::board::can_link->ISR_serve_transmit();
+  kmax::board::links_due.ISR_raise();
 }
 
 void ISR_can1_rx0() {
@@ -374,18 +378,18 @@ void ISR_can1_rx1() {
 }
 
 void ISR_can1_sce() {
-  kmax::board::can_line->ISR_serve_status();
+  kmax::board::can_link->ISR_serve_status();
 }
 
 void ISR_otg_fs() {
   using namespace kmax::board;
   usb_interrupted = true;
-  if (usb_line->ISR_serve()) lines_due.ISR_raise();
+  if (usb_link->ISR_serve()) links_due.ISR_raise();
 }
 
 void ISR_usart2() {
   using namespace kmax::board;
-  if (serial->ISR_serve(application->serial(), system_tick)) lines_due.ISR_raise();
+  if (serial_link->ISR_serve(application->serial(), system_tick)) links_due.ISR_raise();
 }
 
 int main() {

@@ -1,15 +1,18 @@
-// Composition root of the image for QEMU: the application behind the serial line of the ODrive, and SysTick.
+// Composition root of the image for QEMU: the application behind the serial port of the ODrive, and SysTick.
 
 #include <cstdint>
 #include <optional>
 
+#include "board/links/serial_link.hpp"
 #include "board/odrive_v3/description.hpp"
 #include "board/odrive_v3/priorities.hpp"
-#include "board/odrive_v3/serial_line.hpp"
+#include "board/stm32f405/serial_hardware.hpp"
 #include "board/stm32f405/vectors.hpp"
 #include "drivers/cortex_m/core_instructions.hpp"
 #include "drivers/cortex_m/fault_handler.hpp"
 #include "drivers/cortex_m/system_tick.hpp"
+#include "drivers/stm32f4/clock_tree.hpp"
+#include "drivers/stm32f4/interrupts.hpp"
 #include "firmware/application.hpp"
 
 namespace kmax::board {
@@ -23,7 +26,7 @@ constexpr drivers::stm32f4::ClockFrequencies clocks{drivers::stm32f4::ClockSourc
 drivers::cortex_m::InterruptController interrupts{drivers::cortex_m::nvic(), drivers::cortex_m::scb()};
 drivers::cortex_m::SystemTick system_tick{drivers::cortex_m::system_tick(), drivers::cortex_m::scb()};
 std::optional<firmware::Application> application;
-std::optional<odrive_v3::SerialLine> serial;
+std::optional<SerialLink<SerialHardware<drivers::stm32f4::Interrupt::usart2>>> serial_link;
 
 [[noreturn]] void run() {
   application.emplace(firmware::BoardIdentity{.board_name = "qemu",
@@ -31,14 +34,14 @@ std::optional<odrive_v3::SerialLine> serial;
                                               .clock_source = static_cast<std::uint8_t>(clocks.source)});
   odrive_v3::priority::set_all(interrupts);
   if (!system_tick.start(clocks.core_hz, 1'000)) drivers::cortex_m::stop_on_unexpected_interrupt();
-  serial.emplace(interrupts, clocks.apb1_hz);
-  serial->start(application->serial());
+  serial_link.emplace(drivers::stm32f4::usart2(), interrupts, clocks.apb1_hz);
+  serial_link->start(application->serial());
   for (;;) {
     const std::uint32_t now = system_tick.now_us();
     application->poll(now);
-    serial->poll(application->serial(), now);
+    serial_link->poll(application->serial(), now);
     // QEMU's USART never asks for the interrupt when it has sent.
-    if (serial->transmitting()) interrupts.pend(drivers::stm32f4::Interrupt::usart2);
+    if (serial_link->transmitting()) interrupts.pend(drivers::stm32f4::Interrupt::usart2);
     if (application->can().restart_wanted()) drivers::cortex_m::reset_core();
     drivers::cortex_m::wait_for_interrupt();
   }
@@ -59,7 +62,7 @@ void ISR_system_tick() {
 
 void ISR_usart2() {
   using namespace kmax::board;
-  serial->ISR_serve(application->serial(), system_tick);
+  serial_link->ISR_serve(application->serial(), system_tick);
 }
 
 int main() {

@@ -87,6 +87,8 @@ enum class CanSendResult : std::uint8_t {
 template <std::invocable PendTransmit, std::size_t capacity = 16, typename Registers = CanRegisters>
 class Can {
  public:
+  static constexpr std::size_t slots = capacity;
+
   constexpr Can(Registers& registers, PendTransmit pend_transmit)
       : registers_(registers), transmitter_(registers), pend_transmit_(pend_transmit) {}
 

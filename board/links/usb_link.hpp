@@ -2,15 +2,11 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <utility>
 
-#include "board/odrive_v3/can_line.hpp"
 #include "drivers/can_frame.hpp"
-#include "drivers/cortex_m/interrupt_controller.hpp"
-#include "drivers/cortex_m/system_tick.hpp"
-#include "drivers/stm32f4/interrupts.hpp"
-#include "drivers/stm32f4/registers/rcc.hpp"
-#include "drivers/stm32f4/usb_device.hpp"
 #include "firmware/application.hpp"
 #include "firmware/board_interface/usb_port.hpp"
 #include "firmware/exchange/interrupt_queue.hpp"
@@ -18,10 +14,10 @@
 #include "firmware/usb/device.hpp"
 #include "firmware/usb/functions.hpp"
 
-namespace kmax::board::odrive_v3 {
+namespace kmax::board {
 
-/// USB on connector J1, between its interrupt and the links behind it: the serial port's Modbus server, and
-/// the CAN adapter.
+/// A USB device (stm32f405/usb_hardware.hpp is one), between its interrupt and what is behind it: the serial
+/// port's Modbus server, and the CAN adapter.
 ///
 /// Channel 0 of the adapter joins the board's node alone. A host on it is to the node what one on the bus is:
 /// it hears all that the node sends, and sends to it. Channel 1 joins the bus as well: what a host sends
@@ -37,36 +33,32 @@ namespace kmax::board::odrive_v3 {
 /// left for the node.
 ///
 /// Without a host none of this is called but the interrupt, now and then, and due(), one look at a flag.
-class UsbLine {
+template <typename Hardware, typename Clock>
+class UsbLink {
  public:
-  UsbLine(drivers::cortex_m::InterruptController<>& interrupts, firmware::UsbModbusEdge& link,
-          const drivers::cortex_m::SystemTick<>& clock, const firmware::usb::DeviceIdentity& identity,
-          std::uint32_t can_clock_hz, bool boot_loader_is_safe)
-      : interrupts_(interrupts),
-        clock_(clock),
+  /// With what the hardware is made of at the end.
+  template <typename... Facts>
+  UsbLink(firmware::UsbModbusEdge& server, const Clock& clock, const firmware::usb::DeviceIdentity& identity,
+          std::uint32_t can_clock_hz, bool boot_loader_is_safe, Facts&&... facts)
+      : clock_(clock),
         boot_loader_is_safe_(boot_loader_is_safe),
-        functions_(controller_, link, clock, can_clock_hz),
-        device_(controller_, functions_, identity) {}
+        hardware_(std::forward<Facts>(facts)...),
+        functions_(hardware_, server, clock, can_clock_hz),
+        device_(hardware_, functions_, identity) {}
 
-  /// Clock and pins are on, the interrupt has its priority, 48 MHz come from the crystal. Without a core that
-  /// answers there is no USB.
-  void start() {
-    // A boot loader may have left the core in use.
-    using drivers::stm32f4::rcc;
-    drivers::stm32f4::rcc_ahb2enr::OtgFs::set(rcc().ahb2rstr);
-    drivers::stm32f4::rcc_ahb2enr::OtgFs::clear(rcc().ahb2rstr);
-    if (controller_.start(device_mode_polls)) interrupts_.enable(drivers::stm32f4::Interrupt::otg_fs);
-  }
+  /// Clock and pins are on, the interrupt has its priority, 48 MHz come from the crystal.
+  void start() { hardware_.start(); }
 
   /// Main loop: there is something for poll().
   [[gnu::always_inline]] bool due() { return due_.take(); }
-  /// Main loop, behind the application's and before the CAN line sends. As long as a host is there it is due
+  /// Main loop, behind the application's and before the CAN link sends. As long as a host is there it is due
   /// in every turn.
-  void poll(firmware::Application& application, CanLine& line) {
+  template <typename Bus>
+  void poll(firmware::Application& application, Bus& bus) {
     const bool attended = attended_.load(std::memory_order_relaxed);
     functions_.allow_restart(may_restart(application));
     application.usb().set_readings(readings());
-    bool moved = exchange_frames(application.can(), line);
+    bool moved = exchange_frames(application.can(), bus);
     if (functions_.serial().reply_sent()) application.usb().reply_sent();
     moved = application.usb().poll() || moved;
     // What that request began, a save for one, keeps the boot loader away at once.
@@ -75,7 +67,7 @@ class UsbLine {
       functions_.serial().send(reply);
       moved = true;
     }
-    if (moved) interrupts_.pend(drivers::stm32f4::Interrupt::otg_fs);
+    if (moved) hardware_.pend();
     if (attended) due_.ISR_raise();
   }
   /// Main loop, behind poll(): a host asks for a restart into the boot loader, and nothing stands against it.
@@ -83,11 +75,11 @@ class UsbLine {
     return functions_.boot_loader_wanted() && may_restart(application);
   }
   /// The host sees the device leave.
-  void disconnect() { controller_.disconnect(); }
+  void disconnect() { hardware_.disconnect(); }
 
-  /// OTG_FS. True: it has left something for the main loop.
+  /// Its interrupt. True: it has left something for the main loop.
   bool ISR_serve() {
-    const bool some = controller_.ISR_serve(device_);
+    const bool some = hardware_.ISR_serve(device_);
     functions_.ISR_serve();
     attended_.store(device_.ISR_attended(), std::memory_order_relaxed);
     if (some) due_.ISR_raise();
@@ -100,12 +92,8 @@ class UsbLine {
   }
 
  private:
-  using Controller = drivers::stm32f4::UsbDevice<>;
-  using Functions =
-      firmware::usb::Functions<Controller, firmware::UsbModbusEdge, drivers::cortex_m::SystemTick<>>;
+  using Functions = firmware::usb::Functions<Hardware, firmware::UsbModbusEdge, Clock>;
   using Channel = firmware::usb::CanChannel;
-  /// Reads, for 25 ms at 168 MHz and more.
-  static constexpr std::uint32_t device_mode_polls = 600'000;
   static constexpr std::size_t frames_per_poll = 8;
   static constexpr std::uint32_t host_patience_us = 10'000;
 
@@ -143,14 +131,15 @@ class UsbLine {
   };
 
   /// True if frames have moved either way.
-  bool exchange_frames(firmware::CanopenEdge& node, CanLine& line) {
+  template <typename Bus>
+  bool exchange_frames(firmware::CanopenEdge& node, Bus& bus) {
     auto& can = functions_.can();
     const bool there = attended_.load(std::memory_order_relaxed);
     const bool with_node = there && can.is_open(Channel::node), with_bus = there && can.is_open(Channel::bus);
     node.set_reached_over_usb(with_node);
-    line.set_listening_to_all(with_bus);
+    bus.set_listening_to_all(with_bus);
     // All that the node sends is shown here, also what the bus has room for at once.
-    line.set_fed_by_adapter(with_node || with_bus);
+    bus.set_fed_by_adapter(with_node || with_bus);
     bool moved = false;
     if (const std::uint32_t overflows = from_bus_.overflows(); overflows != overflows_) {
       overflows_ = overflows;
@@ -163,14 +152,14 @@ class UsbLine {
     }
     if (!with_node && !with_bus) return moved;
     const std::uint32_t now_us = clock_.now_us();
-    const bool bus_sets_pace = line.keeps_pace(now_us), host_sets_pace = host_keeps_pace(now_us);
+    const bool bus_sets_pace = bus.keeps_pace(now_us), host_sets_pace = host_keeps_pace(now_us);
     moved = take_from_host(node) || moved;
-    moved = pass_guests(node, line, bus_sets_pace) || moved;
+    moved = pass_guests(node, bus, bus_sets_pace) || moved;
     drivers::CanFrame frame;
     for (std::size_t i = 0; i < frames_per_poll; ++i) {
-      const bool waits = (bus_sets_pace && !line.has_room()) || (host_sets_pace && !can.has_room());
+      const bool waits = (bus_sets_pace && !bus.has_room()) || (host_sets_pace && !can.has_room());
       if (waits || !node.next_frame(frame)) break;
-      if (!line.put(frame)) ++frames_not_sent_;
+      if (!bus.put(frame)) ++frames_not_sent_;
       can.show(Channel::node, frame);
       can.show(Channel::bus, frame);
       moved = true;
@@ -207,15 +196,16 @@ class UsbLine {
   }
 
   /// To the bus and to the node, when the bus has room for them or is not waited for.
-  bool pass_guests(firmware::CanopenEdge& node, CanLine& line, bool bus_sets_pace) {
+  template <typename Bus>
+  bool pass_guests(firmware::CanopenEdge& node, Bus& bus, bool bus_sets_pace) {
     auto& can = functions_.can();
     bool moved = false;
     for (std::size_t i = 0; i < frames_per_poll && !guests_.empty(); ++i) {
       const firmware::usb::gs::HostFrame& frame = guests_.first();
       if (can.is_current(frame)) {
-        const bool fits = line.has_room_for_guests();
+        const bool fits = bus.has_room_for_guests();
         if ((bus_sets_pace && !fits) || !can.has_room_for_echo()) break;
-        if (!fits || !line.put(frame.frame)) ++frames_not_sent_;
+        if (!fits || !bus.put(frame.frame)) ++frames_not_sent_;
         node.take(frame.frame);
         can.done(frame);
       }
@@ -225,12 +215,11 @@ class UsbLine {
     return moved;
   }
 
-  drivers::cortex_m::InterruptController<>& interrupts_;
-  const drivers::cortex_m::SystemTick<>& clock_;
+  const Clock& clock_;
   const bool boot_loader_is_safe_;
-  Controller controller_{drivers::stm32f4::otg_fs_global(), drivers::stm32f4::otg_fs_device()};
+  Hardware hardware_;
   Functions functions_;
-  firmware::usb::Device<Controller, Functions> device_;
+  firmware::usb::Device<Hardware, Functions> device_;
   firmware::InterruptSignal due_;
   std::atomic<bool> attended_{false};  ///< the interrupt writes it
   firmware::InterruptQueue<firmware::usb::gs::HostFrame, 16> from_bus_;
@@ -239,4 +228,4 @@ class UsbLine {
   std::uint32_t paced_us_ = 0, paced_fetched_ = 0;  ///< when the host fetched something last
 };
 
-}  // namespace kmax::board::odrive_v3
+}  // namespace kmax::board
