@@ -1,6 +1,6 @@
 #!/bin/sh
 # Compiles the interrupt path for the Cortex-M4F as the images do and fails if its machine code calls anything:
-#   interrupt_path.sh SOURCE_DIR ARM_GXX ARM_NM
+#   interrupt_path.sh SOURCE_DIR ARM_GXX ARM_NM BOARD...
 #
 # An undefined symbol of these objects is a call out of them: libm, the heap, exceptions, or the compiler's own
 # run-time library, which does 64-bit division and everything in double in software. Allowed are the copies
@@ -10,6 +10,7 @@ set -eu
 source_dir=$1
 gxx=$2
 nm=$3
+shift 3
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 flags="-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -O2 -std=c++20 -fno-exceptions -fno-rtti
@@ -70,5 +71,7 @@ check "firmware/drive/axis.cpp" "$source_dir/firmware/drive/axis.cpp" || failed=
 # Those of axis.cpp, likewise.
 axis='^_ZNK?4kmax8firmware4Axis(8ISR_(tick|fill)E|4tripE)'
 allowed="$allowed|$axis"
-check "board/odrive_v3/drives_tick.cpp" "$source_dir/board/odrive_v3/drives_tick.cpp" || failed=1
+for board in "$@"; do
+  check "board/$board/drives_tick.cpp" "$source_dir/board/$board/drives_tick.cpp" || failed=1
+done
 exit $failed

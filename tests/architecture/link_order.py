@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Fails if a function that the tick calls is not the same machine code in every object that emits it.
 
-usage: link_order.py ELF        beside it the linker's map, PROGRAM.map
+usage: link_order.py kmax-BOARD.elf        beside it the linker's map, kmax-BOARD.map
 
 Of an inline function that several files emit, the linker takes the first one it meets. Compiled with other options, or
 among other callers, another file's copy may be slower: then the tick's speed would depend on the order of the sources.
@@ -12,8 +12,6 @@ import sys
 from pathlib import Path
 
 from machine_code import demangled, disassembled
-
-ROOT_FUNCTION = "board::odrive_v3::ISR_tick"
 
 
 def place_free(lines):
@@ -36,8 +34,9 @@ def main(elf):
     calls = {name: {target[1] for line in lines if (target := re.search(r"\bb\S*\s+[0-9a-f]+ <([^>+]+)>", line))}
              for name, lines in disassembled("-d", str(elf))}
     plain = demangled(calls)
-    roots = [name for name, known_as in plain.items() if ROOT_FUNCTION in known_as]
-    assert len(roots) == 1, f"{ROOT_FUNCTION}: {roots}"
+    tick = f"board::{elf.stem.removeprefix('kmax-')}::ISR_tick"
+    roots = [name for name, known_as in plain.items() if tick in known_as]
+    assert len(roots) == 1, f"{tick}: {roots}"
     reached = called_from(calls, roots[0])
     copies = {}
     linked = re.findall(r"^LOAD (\S+)$", elf.with_suffix(".map").read_text(), re.M)

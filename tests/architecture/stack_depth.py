@@ -2,10 +2,10 @@
 """Fails if the stack could grow beyond what linker.ld reserves: the deepest calls of the main loop, of each priority that
 can interrupt it, and of the fault handler, all at once.
 
-usage: stack_depth.py ELF
+usage: stack_depth.py kmax-BOARD.elf
 
 Read from the machine code: how deep the stack is at each instruction, on any path to it, and what is called there. The
-vector table says which handlers there are, board/odrive_v3/priorities.hpp whom each of them can interrupt. Whatever
+vector table says which handlers there are, board/BOARD/priorities.hpp whom each of them can interrupt. Whatever
 this cannot follow has to be stated below, or is a failure: calls through pointers, recursion, and whatever sets the stack
 pointer to anything but a constant away from where it was. What is stated and not found is a failure too.
 Prints a table for docs/image_size.md.
@@ -22,7 +22,7 @@ from machine_code import demangled, disassembled, output_of, plain_name
 
 ROOT = Path(__file__).resolve().parents[2]
 BOARD = ROOT / "board"
-PRIORITIES = BOARD / "odrive_v3" / "priorities.hpp"
+PRIORITIES = "priorities.hpp"
 
 # The registers that an exception saves, those of the FPU included, and the word that aligns them (PM0214).
 EXCEPTION_FRAME = 26 * 4 + 4
@@ -325,7 +325,7 @@ def levels_of(calls, handlers, priorities):
     levels = [level("main loop", [named[RESET]], 0)]
     interrupts = {name.removeprefix("ISR_"): place for name, place in named.items()
                   if name not in (UNEXPECTED, RESET, FAULT)}
-    calls.problems += [f"ISR_{name}: a handler whose priority {PRIORITIES.relative_to(ROOT)} does not say"
+    calls.problems += [f"ISR_{name}: a handler whose priority {PRIORITIES} does not say"
                        for name in sorted(interrupts.keys() - priorities.keys())]
     for number in sorted({priorities[name] for name in interrupts.keys() & priorities.keys()}, reverse=True):
         places = [place for name, place in interrupts.items() if priorities.get(name) == number]
@@ -383,9 +383,9 @@ def main(elf):
                map(str.split, output_of("arm-none-eabi-nm", "--defined-only", str(elf)).splitlines())}
     reserved = symbols["kmax_stack_top"] - symbols["kmax_stack_bottom"]
     levels, problems = examined([(name, plain_name(names[name]), lines) for name, lines in listed], OF_THE_IMAGE,
-                                sections[".vectors"], data, priorities_in(PRIORITIES.read_text()), reserved)
-    problems += [f"{path.relative_to(ROOT)}: sets a priority that {PRIORITIES.name} does not say"
-                 for path in sorted(BOARD.rglob("*.[ch]pp")) if path != PRIORITIES and "set_priority(" in path.read_text()]
+                                sections[".vectors"], data, priorities_in((BOARD / elf.stem.removeprefix("kmax-") / PRIORITIES).read_text()), reserved)
+    problems += [f"{path.relative_to(ROOT)}: sets a priority that {PRIORITIES} does not say"
+                 for path in sorted(BOARD.rglob("*.[ch]pp")) if path.name != PRIORITIES and "set_priority(" in path.read_text()]
     print(table(levels, reserved))
     for problem in problems:
         print(problem, file=sys.stderr)
