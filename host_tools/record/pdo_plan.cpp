@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/canopen/object_places.hpp"
+#include "firmware/object_dictionary/communication_entries.hpp"
 #include "host_tools/base/errors.hpp"
 
 namespace kmax::record {
@@ -54,6 +55,15 @@ class Settings {
   std::map<std::string_view, Setting> values_;
 };
 
+/// Those whose position is in a PDO.
+constexpr std::size_t mapped_axes = [] {
+  std::uint16_t next = 0x6064;
+  for (const auto& pdo : firmware::factory_mappings[1]) {
+    if (pdo[0] == firmware::mapping_of(next, 0, 32)) next += firmware::axis_index_offset;
+  }
+  return (next - 0x6064U) / firmware::axis_index_offset;
+}();
+
 /// How often a bus of this bit rate takes the four PDOs; see the help of tpdo1.event_time.
 std::uint32_t shortest_event_time(std::uint32_t bit_rate) {
   return bit_rate == 0 ? 1 : std::max(1U, 1'000'000U / bit_rate);
@@ -61,6 +71,10 @@ std::uint32_t shortest_event_time(std::uint32_t bit_rate) {
 }  // namespace
 
 PdoPlan read_pdo_plan(device::Device& device, std::uint8_t node) {
+  if (firmware::axis_count > mapped_axes)
+    throw DeviceError(fmt::format(
+        "the factory's PDOs have the values of {} axes and not of all {}: record over the serial port",
+        mapped_axes, firmware::axis_count));
   const Settings settings(device);
   PdoPlan plan{.node = node};
   std::uint32_t event_time = 0;

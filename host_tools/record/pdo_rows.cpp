@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
+
+#include "firmware/object_dictionary/communication_entries.hpp"
 
 namespace kmax::record {
 
@@ -9,9 +12,6 @@ using std::chrono::nanoseconds;
 
 namespace {
 constexpr std::size_t closing = recorded_pdos - 1;
-// The factory's mapping (communication_entries.hpp) has one PDO for each of two axes, one with both
-// velocities and one with both currents and flags.
-static_assert(firmware::axis_count <= 2 && recorded_pdos == 4);
 constexpr std::int64_t nanoseconds_per_tick = 1'000'000'000 / firmware::tick_rate_hz;
 
 std::uint16_t word_at(const drivers::CanFrame& frame, std::size_t byte) {
@@ -37,27 +37,47 @@ std::optional<Row> PdoRows::take(const drivers::CanFrame& frame, nanoseconds tim
   if (number == closing) return close(frame, time);
 
   begin(number);
-  if (number < 2) {
-    const auto count = static_cast<std::int32_t>(long_at(frame, 0));
-    row_.axes[number].position = static_cast<double>(count) * plan_.count_lengths[number];
-    row_.axes[number].force = real_at(frame, 4);
-  } else {
-    row_.axes[0].velocity = real_at(frame, 0);
-    row_.axes[1].velocity = real_at(frame, 4);
-  }
+  take_values(number, frame);
   return std::nullopt;
+}
+
+void PdoRows::take_values(std::size_t number, const drivers::CanFrame& frame) {
+  using firmware::mapping_of;
+  std::size_t byte = 0;
+  for (const std::uint32_t mapping : firmware::factory_mappings[1][number]) {
+    for (std::size_t axis = 0; axis < row_.axes.size(); ++axis) {
+      AxisSample& sample = row_.axes[axis];
+      switch (mapping - static_cast<std::uint32_t>(axis * firmware::axis_index_offset << 16)) {
+        case mapping_of(0x6064, 0, 32):
+          sample.position = static_cast<std::int32_t>(long_at(frame, byte)) * plan_.count_lengths[axis];
+          break;
+        case mapping_of(0x2012, 3, 32):
+          sample.velocity = real_at(frame, byte);
+          break;
+        case mapping_of(0x2012, 4, 32):
+          sample.force = real_at(frame, byte);
+          break;
+        case mapping_of(0x2019, 1, 16):
+          sample.current = static_cast<float>(static_cast<std::int16_t>(word_at(frame, byte))) / 1000.0F;
+          break;
+        default:
+          break;
+      }
+    }
+    byte += (mapping & 0xFF) / 8;
+  }
 }
 
 void PdoRows::begin(std::size_t number) {
   // One that has come already, or one after it: the row before was never closed.
-  const bool of_next_row = std::any_of(has_.begin() + static_cast<std::ptrdiff_t>(number), has_.end(),
-                                       [](bool has) { return has; });
+  const bool of_next_row =
+      std::any_of(has_.begin() + static_cast<std::ptrdiff_t>(number), has_.end(), std::identity());
   if (of_next_row) has_ = {};
   has_[number] = true;
 }
 
 std::optional<Row> PdoRows::close(const drivers::CanFrame& frame, nanoseconds time) {
-  const bool complete = has_[0] && has_[1] && has_[2];
+  const bool complete = std::all_of(has_.begin(), has_.end(), std::identity());
   const bool first_frame = !seen_time_;
   has_ = {};
   const std::uint64_t tick = unwrapped(word_at(frame, 6), time);
@@ -76,10 +96,10 @@ std::optional<Row> PdoRows::close(const drivers::CanFrame& frame, nanoseconds ti
   last_row_ = tick;
   const std::uint16_t flags = word_at(frame, 4);
   row_.tick = tick;
+  take_values(closing, frame);
   for (std::size_t axis = 0; axis < row_.axes.size(); ++axis) {
     AxisSample& sample = row_.axes[axis];
     sample.tick = tick;
-    sample.current = static_cast<float>(static_cast<std::int16_t>(word_at(frame, 2 * axis))) / 1000.0F;
     sample.flags = static_cast<std::uint16_t>(flags >> (8 * axis) & 0xFF);
   }
   return row_;

@@ -37,6 +37,7 @@ class PdoRows {
 
  private:
   void begin(std::size_t number);
+  void take_values(std::size_t number, const drivers::CanFrame& frame);
   std::optional<Row> close(const drivers::CanFrame& frame, std::chrono::nanoseconds time);
   std::uint64_t unwrapped(std::uint16_t low, std::chrono::nanoseconds time) const;
   std::uint64_t periods(std::uint64_t ticks) const {
@@ -45,7 +46,7 @@ class PdoRows {
 
   PdoPlan plan_;
   Row row_;
-  std::array<bool, 3> has_{};
+  std::array<bool, recorded_pdos - 1> has_{};
   // The last fourth PDO; before the first one, the tick the recording began at.
   std::uint64_t seen_tick_;
   std::optional<std::chrono::nanoseconds> seen_time_;
