@@ -67,8 +67,16 @@ struct MotorKnowledge {
   double dead_time_band() const {
     return inductance > 0.0 ? std::max(supply * dead_time / inductance, 0.01) : 0.01;
   }
-  // Largest voltage that the bridge can give: between two legs, or the amplitude of a vector.
-  double largest_voltage() const { return 0.85 * supply * (brushed() ? 1.0 : 0.5773502691896258); }
+  // Largest voltage that the bridge can give: between two legs, or the amplitude of a vector. What the
+  // current controllers leave for their dead time and for rounding is left here too. An axis beside this one
+  // with a larger limit lowers the amplifiers' gain, which allows more.
+  double largest_voltage() const {
+    const auto gain =
+        drivers::gain_for_current(firmware::over_current_factor * static_cast<float>(current_limit),
+                                  static_cast<float>(electronics->shunt));
+    const auto share = static_cast<double>(electronics->modulation_limit[static_cast<std::size_t>(gain)]);
+    return 0.97 * share * supply * (brushed() ? 1.0 : 0.5773502691896258);
+  }
 };
 
 // The step's verdict is "no".
