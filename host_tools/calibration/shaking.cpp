@@ -69,14 +69,14 @@ InducedVoltage induced_in_waves(const Waveforms& seen, const MotorKnowledge& kno
   add_component(rises, seen.of("voltage"), current, known.resistance, half_period, first, end);
   if (seen.channels.contains("voltage_d"))
     add_component(rises, seen.of("voltage_d"), current, 0.0, half_period, first, end);
-  const auto waves = static_cast<double>(rises.squares.size());
-  if (waves < 2.0) return none;
+  const auto whole_waves = static_cast<double>(rises.squares.size());
+  if (whole_waves < 2.0) return none;
   // Of the samples, not of the rises: a synchronous motor under a dead encoder swings, and each wave differs.
   double square = 0.0;
   for (const double one : rises.squares) square += one;
   const double error =
       std::sqrt(rises.noise_square) * std::sqrt(2.0 / (0.3 * static_cast<double>(half_period))) / 0.4;
-  return {std::sqrt(square / waves), error * (1.0 / std::sqrt(waves) + 0.2)};
+  return {std::sqrt(square / whole_waves), error * (1.0 / std::sqrt(whole_waves) + 0.2)};
 }
 
 InducedVoltage induced_in_push(const Waveforms& seen, const MotorKnowledge& known) {
@@ -319,8 +319,8 @@ void Shaking::prepare() {
     if (half_period_ >= longest) break;
     const double factor =
         seen_ > 0.0 ? std::clamp(std::sqrt(stroke_ / seen_), 0.4, largest_factor) : largest_factor;
-    constexpr double fewest_counts = 10.0;
-    moved_before = factor >= 1.0 && seen_ >= fewest_counts * known_.count_length();
+    constexpr double fewest_counts_moved = 10.0;
+    moved_before = factor >= 1.0 && seen_ >= fewest_counts_moved * known_.count_length();
     half_period_ = std::clamp(static_cast<int>(std::lround(half_period_ * factor)), 20, longest);
   }
   if (seen_ > 0.3 * stroke_) return;

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <string>
 
 #include "host_tools/plot/figure.hpp"
 #include "tests/host_tools/simulated_board/torque_ripple.hpp"
+#include "tests/host_tools/simulation/scene_file.hpp"
 
 namespace {
 
@@ -39,12 +39,6 @@ constexpr std::array rows{
         {.dead_time = true, .cogging = true, .friction = true, .gravity = true, .limit_share = unbounded}},
 };
 
-simulation::Scene scene(const char* name) {
-  const auto root = std::filesystem::path(__FILE__).parent_path() / "../..";
-  return simulation::load_scene(
-      (root / "host_tools/simulation/scenes" / (std::string(name) + ".toml")).string());
-}
-
 void print_introduction() {
   std::printf(R"(# Torque ripple at the handle
 
@@ -69,7 +63,7 @@ what that bound costs. Gravity and cogging come first, friction gets what they l
 }
 
 void print_motor(const char* name) {
-  const auto what = scene(name);
+  const auto what = simulation::scene_file(name);
   const auto& device = what.axes[0].device;
   const std::string described = what.description.substr(0, what.description.find(", not yet calibrated"));
   std::printf("## %s\n\n%s. Friction %.0f mN", name, described.c_str(), 1e3 * device.friction);
@@ -106,7 +100,7 @@ plot::Panel panel(const char* name, const char* title, double highest) {
   drawn.y_limits = {0.0, highest};  // with room for the legend
   for (const std::size_t row : {std::size_t{0}, std::size_t{2}, rows.size() - 1}) {
     torque_ripple::Trace trace;
-    torque_ripple::Rig rig(scene(name), rows[row].on);
+    torque_ripple::Rig rig(simulation::scene_file(name), rows[row].on);
     rig.moving(&trace);
     plot::Series series;
     series.label = rows[row].name;
