@@ -70,8 +70,8 @@ class Application {
   const AxisOutput& ISR_tick(std::size_t axis, const Tick::SlotInput& input) {
     return axes_.tick().ISR_tick(axis, input);
   }
-  /// The same for a board whose interrupt reaches it by its own address: an offset into this large object costs
-  /// the tick an instruction at every access.
+  /// What stands behind it, for a board whose interrupt reaches it by its own address: an offset into this
+  /// large object costs the tick an instruction at every access. Simulations pass over ticks by it.
   Tick& ISR_axes() { return axes_.tick(); }
   /// In place of it, for an axis that the board does not have.
   [[gnu::cold]] void ISR_tick(std::size_t axis) { axes_.tick().ISR_tick(axis); }
@@ -85,11 +85,6 @@ class Application {
   /// Between two ticks: the last one began a round, in which all axes report. Behind the last axis' tick the
   /// main loop should be woken: what it reads then is of this tick.
   bool ISR_round_begins() const { return axes_.tick().ISR_round_begins(); }
-
-  /// For a simulation, see AxesTick: ticks from now that would change nothing but the time on the first
-  /// `present` axes, and what stands in place of so many of them.
-  std::uint32_t ISR_held_ticks(std::size_t present) const { return axes_.tick().ISR_held_ticks(present); }
-  void ISR_pass_held(std::uint32_t ticks) { axes_.tick().ISR_pass_held(ticks); }
 
   void poll(std::uint32_t now_us);
   /// Before poll(), as often as they change.

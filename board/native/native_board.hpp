@@ -144,12 +144,12 @@ class NativeBoard {
   std::uint64_t advance_held(std::uint64_t most) {
     if constexpr (HoldingDevice<Device>) {
       if (!device_.only_moves() || somebody_speaks()) return 0;
-      const std::uint64_t held = application_->ISR_held_ticks(device_.axis_count());
+      const std::uint64_t held = application_->ISR_axes().ISR_held_ticks(device_.axis_count());
       const auto ticks = static_cast<std::uint32_t>(held < most ? held : most);
       if (ticks == 0) return 0;
       device_.advance(static_cast<double>(tick_us) * 1e-6, ticks);
       now_us_ += std::uint64_t{tick_us} * ticks;
-      application_->ISR_pass_held(ticks);
+      application_->ISR_axes().ISR_pass_held(ticks);
       return ticks;
     } else {
       return 0;
