@@ -157,7 +157,10 @@ int run(const std::vector<std::string>& arguments, Context& context) {
     return base::done;
   }
   const std::optional<int> ended = parse(app, arguments, context);
-  return ended ? *ended : act(context);
+  if (ended && *ended != base::done) return *ended;
+  // A text that was asked for is an output like any other: it can meet a full disk.
+  if (ended) context.action = [] { return base::done; };
+  return act(context);
 }
 
 std::optional<std::string> Context::named_device() const {

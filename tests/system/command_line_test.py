@@ -253,6 +253,34 @@ class RoundTrips(unittest.TestCase):
             self.assertEqual(second - first, 2)
 
 
+class ClosedStreams(unittest.TestCase):
+    """Whoever starts a program may close its standard streams: the next file it opens would get their numbers."""
+
+    def test_what_is_said_goes_into_no_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            store, link = Path(folder) / "store", Path(folder) / "line"
+            with Serve("--store", str(store)) as serve:
+                kmax("set", "wall.stiffness=1234", device=serve.device)
+                kmax("save", device=serve.device)
+            kept = store.read_bytes()
+            for closed in (">&- 2>&-", "<&- >&-", "<&- >&- 2>&-"):
+                with subprocess.Popen(["sh", "-c", f"exec {KMAX} serve --serial {link} --store {store} {closed}"]) as serve:
+                    end = time.monotonic() + PATIENCE
+                    while not link.is_symlink() and time.monotonic() < end:
+                        time.sleep(0.01)
+                    value = kmax_json("get", "wall.stiffness", device=f"serial:{link}")["wall.stiffness"]["value"]
+                    serve.send_signal(signal.SIGTERM)
+                    serve.wait(PATIENCE)
+                self.assertEqual(value, 1234, closed)
+                self.assertEqual(store.read_bytes(), kept, closed)
+
+    def test_an_output_that_is_closed_is_a_failure(self):
+        for command in ("get wall.stiffness", "list", "--help", "record - --for 0.1", "watch --for 0.1"):
+            done = subprocess.run(["sh", "-c", f"exec {KMAX} --device sim {command} >&-"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1, command)
+            self.assertIn("written", done.stderr, command)
+
+
 class VanishingPort(unittest.TestCase):
     def test_a_server_that_dies_in_mid_command_ends_it_with_a_message(self):
         with Serve() as board:

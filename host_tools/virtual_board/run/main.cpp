@@ -8,6 +8,7 @@
 
 #include "host_tools/base/exit_code.hpp"
 #include "host_tools/base/interruption.hpp"
+#include "host_tools/base/standard_streams.hpp"
 #include "host_tools/serve/pseudo_terminal.hpp"
 #include "host_tools/simulated_board/file_flash.hpp"
 #include "host_tools/simulated_board/scene_parameters.hpp"
@@ -130,6 +131,7 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::open_standard_streams();
   CLI::App app{
       "Runs a Kmax image, the very one that is flashed, on an emulated ODrive v3.6 with the motors and "
       "handles of a scene.\nWhat the firmware must not do (an unknown register, a clock that is off) stops "
