@@ -9,6 +9,8 @@
 #include <cstring>
 #include <fstream>
 
+#include "host_tools/base/errors.hpp"
+
 namespace kmax::base {
 
 namespace {
@@ -46,20 +48,50 @@ std::runtime_error cannot_write(const std::string& path) {
 }
 
 void check_writable(const std::string& path) {
-  const bool was_there = std::filesystem::exists(path);
+  struct stat there {};
+  if (::stat(path.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) {
+    if (S_ISDIR(there.st_mode) || ::access(path.c_str(), W_OK) != 0) throw cannot_write(path);
+    return;
+  }
+  std::error_code ignored;
+  const bool was_there = std::filesystem::exists(path, ignored);
+  // Opening a link that leads nowhere would make its target.
+  if (!was_there && std::filesystem::is_symlink(path, ignored)) throw cannot_write(path);
   if (!std::ofstream(path, std::ios::app)) throw cannot_write(path);
   if (!was_there) std::filesystem::remove(path);
 }
 
+void require_different_files(std::initializer_list<NamedFile> files) {
+  const auto one_file = [](const std::string& one, const std::string& other) {
+    std::error_code ignored;
+    return std::filesystem::equivalent(one, other, ignored) ||
+           std::filesystem::weakly_canonical(one, ignored) ==
+               std::filesystem::weakly_canonical(other, ignored);
+  };
+  for (const NamedFile* file = files.begin(); file != files.end(); ++file) {
+    if (file->path.empty() || file->path == "-") continue;
+    for (const NamedFile* before = files.begin(); before != file; ++before) {
+      if (before->path.empty() || before->path == "-" || !one_file(before->path, file->path)) continue;
+      struct stat there {};
+      // /dev/null and a terminal take both.
+      if (::stat(file->path.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) continue;
+      throw ValueError(fmt::format("{} {} is the same file as {}; give another name", file->option,
+                                   file->path, before->option));
+    }
+  }
+}
+
 void write_file(const std::filesystem::path& path, std::string_view text) {
   // A link stays one.
+  struct stat before {};
+  const bool was_there = ::stat(path.c_str(), &before) == 0;
   std::error_code ignored;
-  std::filesystem::path target = std::filesystem::canonical(path, ignored);
+  // What /dev/stdout leads to may have no path: a pipe.
+  const bool regular = !was_there || S_ISREG(before.st_mode);
+  std::filesystem::path target = regular ? std::filesystem::canonical(path, ignored) : path;
   if (target.empty() && std::filesystem::is_symlink(path, ignored)) fail(path, ENOENT);
   if (target.empty()) target = path;
-  struct stat before {};
-  const bool was_there = ::stat(target.c_str(), &before) == 0;
-  if (was_there && !S_ISREG(before.st_mode)) {
+  if (!regular) {
     const int descriptor = ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
     if (descriptor < 0) fail(path, errno);
     const int error = write_all(descriptor, text);

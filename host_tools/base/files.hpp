@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -10,8 +11,17 @@ namespace kmax::base {
 /// What to say when a file cannot be written.
 std::runtime_error cannot_write(const std::string& path);
 
-/// Throws cannot_write() before anybody waits for what is to be written. Leaves what is there.
+/// Throws cannot_write() before anybody waits for what is to be written. Leaves what is there, and opens no
+/// pipe: its reader would take the closing for the end.
 void check_writable(const std::string& path);
+
+/// A file that a command line names, and by which option.
+struct NamedFile {
+  std::string_view option;
+  std::string path;  ///< empty or "-": none
+};
+/// Throws ValueError if two of them are one file, by whatever names or links.
+void require_different_files(std::initializer_list<NamedFile> files);
 
 /// Whole or not at all: who reads the file finds the old text or the new one, whatever happens meanwhile. The
 /// text goes into a new file beside it, which takes its name when it is on the disk; it keeps the permissions

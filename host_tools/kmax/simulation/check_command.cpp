@@ -194,6 +194,7 @@ int draw_map(Context& context, const CheckOptions& options) {
   for (const std::string& side : options.sides) sides.push_back(map_side(side, context.axis()));
   if (sides[0].parameter == sides[1].parameter)
     throw UsageError(fmt::format("--map: both sides are {}; name two parameters", sides[0].parameter.name()));
+  base::require_different_files({{"--picture", options.picture}, {"--csv", options.csv}});
   if (!options.picture.empty()) plot::require_picture_name(options.picture);
   if (!options.csv.empty()) base::check_writable(options.csv);
   const check::HandChoice hand = check::choose_hand(options.hand);
@@ -293,7 +294,7 @@ void add_check_command(CLI::App& app, Context& context) {
   kmax check --set guard.damping=0.5 --set wall.stiffness=2N/mm --hand subject_1
   kmax check --explain colgate               formula, assumptions, source; without a name, of all
   kmax check --set guard.friction=0.1 --map wall.stiffness=100..10000:log --map guard.damping=0.01..10:log \
-             --picture map.svg             green where every criterion passes, as a line where each begins to
+             --picture map.svg             blue where every criterion passes, as a line where each begins to
 
 Sets nothing. 'pass' means that every criterion that applies is met; most walls in use are without a guarantee and
 still hold: the table says which criteria guarantee, which are necessary, and which are heuristics.

@@ -190,6 +190,9 @@ int run_simulate(Context& context, const SimulateOptions& options) {
   if (options.keys) return print_keys(context, options);
   if (options.scene.empty())
     throw UsageError(fmt::format("a SCENE is missing: a TOML file, or one of {}", supplied_scene_names()));
+  base::require_different_files(
+      {{"SCENE", options.scene}, {"--csv", options.csv}, {"--picture", options.picture}});
+  if (!options.csv.empty()) base::check_writable(options.csv);
   const simulation::Scene scene =
       simulated_board::open_scene(options.scene, simulated_board::parse_settings(options.settings));
   const RunResult result = simulated_board::run_scene(scene);

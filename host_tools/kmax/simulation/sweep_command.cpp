@@ -135,6 +135,7 @@ int run_sweep_command(Context& context, const SweepOptions& options) {
                                      sweep.settings.back().shown));
     }
   }
+  base::require_different_files({{"SCENE", options.scene}, {"--out", options.file}});
   if (!options.file.empty() && options.file != "-") base::check_writable(options.file);
   if (!experiment::check_sweep(sweep) && options.repeats > 1)
     context.note(

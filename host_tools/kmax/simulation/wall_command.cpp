@@ -85,9 +85,7 @@ int run_wall(Context& context, const WallOptions& options) {
   }
   const wall::WallEvaluator evaluator(values, context.axis());
   if (!table) return evaluate_point(context, options, evaluator);
-  std::error_code ignored;
-  if (std::filesystem::equivalent(options.input, options.output, ignored))
-    throw UsageError(fmt::format("--out {} is the table that is read; give another name", options.output));
+  base::require_different_files({{"--csv", options.input}, {"--out", options.output}});
   if (options.output == "-") {
     if (context.json) throw UsageError("--json and --out - exclude each other: both write standard output");
     context.out << wall::evaluated_table(evaluator, options.input).text;

@@ -104,4 +104,53 @@ TEST_F(Files, WhatIsNoRegularFileIsWrittenDirectly) {
   EXPECT_TRUE(std::filesystem::exists("/dev/null"));
 }
 
+// Its reader would take the closing for the end, and a link would stay behind with an empty target.
+TEST_F(Files, ToTryWhetherTheyCanBeWrittenLeavesPipesAndLinksAlone) {
+  const std::filesystem::path pipe = folder / "pipe", link = folder / "link";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  check_writable(pipe);  // would wait for a reader if it opened it
+  std::filesystem::create_symlink(folder / "nowhere", link);
+  EXPECT_THROW(check_writable(link), std::runtime_error);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(files_in_folder(), 2u);
+  EXPECT_THROW(check_writable(folder), std::runtime_error);
+  check_writable(folder / "new");
+  EXPECT_EQ(files_in_folder(), 2u);
+}
+
+TEST_F(Files, APipeWithoutAPathIsWritten) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const std::string path = "/dev/fd/" + std::to_string(ends[1]);
+  check_writable(path);
+  write_file(path, "through");
+  char got[8] = {};
+  EXPECT_EQ(read(ends[0], got, sizeof got), 7);
+  EXPECT_STREQ(got, "through");
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST_F(Files, ThatAreOneUnderTwoNamesAreRefused) {
+  const auto refused = [&](const std::string& one, const std::string& other) {
+    try {
+      require_different_files({{"--csv", one}, {"--scene", "-"}, {"--picture", other}});
+      return std::string("accepted");
+    } catch (const ValueError& error) {
+      return std::string(error.what());
+    }
+  };
+  const std::string file = folder / "f";
+  EXPECT_EQ(refused(file, folder / "g"), "accepted");
+  EXPECT_EQ(refused("", ""), "accepted");
+  EXPECT_EQ(refused("/dev/null", "/dev/null"), "accepted");
+  EXPECT_EQ(refused(file, file), "--picture " + file + " is the same file as --csv; give another name");
+  EXPECT_NE(refused(file, folder / "." / "f"), "accepted") << "neither is there yet";
+  write_file(file, "");
+  std::filesystem::create_symlink(file, folder / "link");
+  std::filesystem::create_hard_link(file, folder / "hard");
+  EXPECT_NE(refused(file, folder / "link"), "accepted");
+  EXPECT_NE(refused(folder / "hard", file), "accepted");
+}
+
 }  // namespace kmax::base::files_test

@@ -195,4 +195,14 @@ TEST_F(Simulate, TheKeysAreAPageOrADocument) {
   expect_error({"simulate", "touch", "--keys"}, base::wrong_usage, "give it alone");
 }
 
+TEST_F(Simulate, WritesNoFileOverAnother) {
+  const std::string own = folder.write("own.toml", "duration = 0.1\n[device]\n").string();
+  expect_error({"simulate", own, "--csv", own}, base::wrong_usage,
+               "--csv " + own + " is the same file as SCENE");
+  expect_error({"simulate", own, "--csv", in("s.svg"), "--picture", in("s.svg")}, base::wrong_usage,
+               "is the same file as --csv");
+  EXPECT_CONTAINS(folder.read("own.toml"), "duration");
+  EXPECT_FALSE(std::filesystem::exists(in("s.svg")));
+}
+
 }  // namespace kmax::cli::simulate_command_test

@@ -166,4 +166,11 @@ TEST_F(Sweep, WhatCannotBeMeantIsRefusedBeforeAnythingRuns) {
   EXPECT_FALSE(std::filesystem::exists(in("never.csv")));
 }
 
+TEST_F(Sweep, TheSceneIsNotOverwritten) {
+  const std::string own = scene(), text = folder.read("held.toml");
+  expect_error({"sweep", own, "--set", "seed=1", "--out", own}, base::wrong_usage,
+               "is the same file as SCENE; give another name");
+  EXPECT_EQ(folder.read("held.toml"), text);
+}
+
 }  // namespace kmax::cli::sweep_command_test
