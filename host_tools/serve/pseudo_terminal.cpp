@@ -24,12 +24,34 @@ bool may_replace(const std::filesystem::path& link) {
   const auto target = std::filesystem::read_symlink(link, error);
   return !std::filesystem::exists(link, error) || target.string().starts_with("/dev/pts/");
 }
+
+/// What a server holds on its terminal as long as it serves. Not flock(), which programs that use a serial
+/// port take on it.
+struct flock mark_of_a_server() {
+  struct flock mark {};
+  mark.l_type = F_WRLCK;
+  mark.l_whence = SEEK_SET;
+  return mark;
+}
+
+/// A link that a killed server left behind leads to a number that any terminal may have meanwhile.
+bool is_served(const std::filesystem::path& link) {
+  const int terminal = open(link.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (terminal < 0) return false;
+  struct flock mark = mark_of_a_server();
+  const bool served = fcntl(terminal, F_OFD_GETLK, &mark) == 0 && mark.l_type != F_UNLCK;
+  close(terminal);
+  return served;
+}
 }  // namespace
 
 PseudoTerminal::PseudoTerminal(const std::filesystem::path& link) : link_(link) {
   if (!may_replace(link))
     throw std::runtime_error(fmt::format(
         "{}: something else has this name; choose another one for the serial link", link.string()));
+  if (is_served(link))
+    throw std::runtime_error(fmt::format(
+        "{}: another program serves a serial link here; end that one or give another name", link.string()));
   controlling_.number = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (controlling_.number < 0 || grantpt(controlling_.number) != 0 || unlockpt(controlling_.number) != 0)
     fail("no pseudo-terminal to be had");
@@ -42,6 +64,8 @@ PseudoTerminal::PseudoTerminal(const std::filesystem::path& link) : link_(link) 
   if (kept_open_.number < 0 || tcgetattr(kept_open_.number, &settings) != 0) fail(device_.string());
   cfmakeraw(&settings);
   tcsetattr(kept_open_.number, TCSANOW, &settings);
+  struct flock mark = mark_of_a_server();
+  if (fcntl(kept_open_.number, F_OFD_SETLK, &mark) != 0) fail(device_.string());
 
   std::error_code error;
   std::filesystem::remove(link, error);

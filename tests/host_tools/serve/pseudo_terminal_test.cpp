@@ -117,4 +117,23 @@ TEST(PseudoTerminal, AMissingFolderIsSaidAndNothingStaysOpen) {
   EXPECT_EQ(open_descriptors(), before);
 }
 
+TEST(PseudoTerminal, DoesNotTakeTheNameOfOneThatIsServed) {
+  const TemporaryFolder folder;
+  const auto second = [&] {
+    return thrown_message<std::runtime_error>([&] { PseudoTerminal(folder / "line"); });
+  };
+  {
+    const PseudoTerminal first(folder / "line");
+    const auto target = std::filesystem::read_symlink(folder / "line");
+    EXPECT_CONTAINS(second(), "another program serves a serial link here");
+    EXPECT_EQ(std::filesystem::read_symlink(folder / "line"), target);
+  }
+  // Left behind by one that was killed, whose terminal somebody else has meanwhile.
+  const int others = posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_EQ(unlockpt(others), 0);
+  std::filesystem::create_symlink(ptsname(others), folder / "line");
+  EXPECT_EQ(second(), "");
+  close(others);
+}
+
 }  // namespace kmax::serve::pseudo_terminal_test
