@@ -76,6 +76,7 @@ CsvTable read_csv(const std::filesystem::path& path, const CsvDemand& demand) {
     if (table.names.empty()) {
       table.names.assign(fields.begin(), fields.end());
       table.columns.resize(fields.size());
+      table.strange.resize(fields.size());
       demanded = demanded_columns(table, demand, file, number, line);
       continue;
     }
@@ -87,6 +88,8 @@ CsvTable read_csv(const std::filesystem::path& path, const CsvDemand& demand) {
       if (demanded[i] && !std::isfinite(value))
         throw CsvError(fmt::format("{}:{}: {} is '{}'; a finite number is needed", file, number,
                                    table.names[i], fields[i]));
+      if (!std::isfinite(value) && !fields[i].empty() && fields[i] != "nan" && table.strange[i].empty())
+        table.strange[i] = fmt::format("{}:{}: {} is '{}'", file, number, table.names[i], fields[i]);
       table.columns[i].push_back(value);
     }
   }
@@ -104,6 +107,15 @@ const std::vector<double>& CsvTable::column(const std::string& name) const {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return columns[static_cast<std::size_t>(found - names.begin())];
   throw CsvError(fmt::format("there is no column '{}'; the columns are {}", name, fmt::join(names, ", ")));
+}
+
+const std::vector<double>& CsvTable::numbers(const std::string& name) const {
+  const std::vector<double>& found = column(name);
+  if (std::count(names.begin(), names.end(), name) > 1)
+    throw CsvError(fmt::format("two columns are named {}; name them apart", name));
+  const std::string& where = strange[static_cast<std::size_t>(&found - columns.data())];
+  if (!where.empty()) throw CsvError(fmt::format("{}; a number, nothing, or nan is needed", where));
+  return found;
 }
 
 std::string label_of(const std::string& column) {

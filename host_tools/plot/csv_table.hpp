@@ -18,10 +18,15 @@ class CsvError : public std::runtime_error {
 struct CsvTable {
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;
+  /// Of each column the first field that is neither a finite number nor empty nor nan: where it stands and
+  /// what it is. Empty: none.
+  std::vector<std::string> strange;
 
   /// Throws CsvError naming the columns there are.
   const std::vector<double>& column(const std::string& name) const;
   bool has(const std::string& name) const;
+  /// The same column; throws CsvError where two have that name, or a field of it is strange.
+  const std::vector<double>& numbers(const std::string& name) const;
 };
 
 /// Columns that somebody computes with: each named at most once, with a finite number in every row. Where one

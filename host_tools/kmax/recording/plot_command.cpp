@@ -3,8 +3,8 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <functional>
 
 #include "host_tools/base/print.hpp"
 #include "host_tools/kmax/commands.hpp"
@@ -35,8 +35,14 @@ struct PlotOptions {
   }
 };
 
+/// NaN is a gap, and no gap differs from another.
 bool changes(const std::vector<double>& values) {
-  return std::adjacent_find(values.begin(), values.end(), std::not_equal_to<>()) != values.end();
+  return std::adjacent_find(values.begin(), values.end(), [](double one, double next) {
+           return one != next && !(std::isnan(one) && std::isnan(next));
+         }) != values.end();
+}
+bool has_numbers(const std::vector<double>& values) {
+  return std::any_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
 /// A panel of a straight line says nothing: what stays as it is and what counts the device's ticks is drawn
@@ -45,7 +51,7 @@ std::vector<std::string> columns_worth_drawing(Context& context, const plot::Csv
                                                const std::string& x) {
   std::vector<std::string> all, worth, left_out;
   for (const std::string& name : table.names) {
-    if (name == x) continue;
+    if (name == x || !has_numbers(table.column(name))) continue;
     all.push_back(name);
     const bool counter = name == "tick" || name.ends_with("_tick");
     (counter || !changes(table.column(name)) ? left_out : worth).push_back(name);
@@ -64,6 +70,13 @@ plot::Figure figure_of(Context& context, const plot::CsvTable& table, const Plot
   const std::string x = options.x.empty() ? table.names.front() : options.x;
   const std::vector<std::string> columns =
       options.y.empty() ? columns_worth_drawing(context, table, x) : options.y;
+  if (columns.empty())
+    throw plot::CsvError(fmt::format(
+        "{}: beside {} there is no column of numbers; columns are separated by commas", options.table, x));
+  for (const std::string& column : columns) {
+    if (!has_numbers(table.numbers(column)) || !has_numbers(table.numbers(x)))
+      throw plot::CsvError(fmt::format("{}: {} over {} has no number to draw", options.table, column, x));
+  }
   plot::Figure figure;
   figure.title = std::filesystem::path(options.table).filename().string();
   figure.x_label = plot::label_of(x);

@@ -44,7 +44,20 @@ TEST_F(Plot, WhatDoesNotChangeIsDrawnOnlyIfAskedFor) {
 TEST_F(Plot, BadInput) {
   expect_error({"plot"}, base::wrong_usage, "table is required");
   expect_error({"plot", in("none.csv")}, base::wrong_usage, "cannot be read");
-  expect_error({"plot", folder.write("one.csv", "a\n1\n").string()}, base::failed, "nothing to draw");
+  expect_error({"plot", folder.write("one.csv", "a\n1\n").string()}, base::wrong_usage,
+               "beside a there is no column of numbers; columns are separated by commas");
+  expect_error({"plot", folder.write("one.csv", "a;b\n1;2\n").string()}, base::wrong_usage,
+               "columns are separated by commas");
+  expect_error({"plot", folder.write("bad.csv", "a,b\n1,2\n2,abc\n").string()}, base::wrong_usage,
+               "bad.csv:3: b is 'abc'");
+  expect_error({"plot", folder.write("bad.csv", "a,b\nx,2\n2,3\n").string()}, base::wrong_usage,
+               "bad.csv:2: a is 'x'");
+  expect_error({"plot", folder.write("bad.csv", "a,b\n1,nan\n2,\n").string(), "--y", "b"}, base::wrong_usage,
+               "b over a has no number to draw");
+  // A column of words is passed over.
+  EXPECT_EQ(kmax({"plot", folder.write("run.csv", "a,b,why\n1,2,stable\n2,3,unstable\n").string()}),
+            base::done)
+      << said;
   expect_error({"plot", folder.write("run.csv", "a,b\n1,2\n").string(), "--out", in("a.pdf")},
                base::wrong_usage, "must end in .svg or .png");
 }
