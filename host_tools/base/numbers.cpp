@@ -87,11 +87,17 @@ constexpr Conversion conversions[] = {
     {"V", "uV", over(1e6)},          {"s", "ns", over(1e9)},          {"kg", "mg", over(1e6)},
 };
 
+/// The micro sign, as the table has it, and the Greek letter look the same.
+constexpr std::string_view micro_sign = "µ", greek_mu = "μ";
+
 std::string without_spacing(std::string_view text) {
   std::string bare;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text.substr(i).starts_with("·")) {
       i += std::string_view("·").size() - 1;
+    } else if (text.substr(i).starts_with(greek_mu)) {
+      bare += micro_sign;
+      i += greek_mu.size() - 1;
     } else if (text[i] != ' ' && text[i] != '*') {
       bare += text[i];
     }
@@ -137,7 +143,8 @@ WrittenNumber written_number(std::string_view given, std::string_view unit, std:
   const std::string_view digits =
       rest.starts_with('-') && rest.size() != text.size() ? "" : rest.substr(rest.starts_with('-'));
   const bool starts_like_a_number = digits.find_first_of("0123456789") == (digits.starts_with('.') ? 1u : 0u);
-  if (!starts_like_a_number) throw ValueError(fmt::format("'{}' is not {}", text, kind));
+  if (!starts_like_a_number)
+    throw ValueError(fmt::format("'{}' is not {}; allowed is {}", text, kind, allowed));
 
   double number = 0;
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);

@@ -82,6 +82,11 @@ std::uint32_t raw_of(const Parameter& parameter, base::WrittenNumber number) {
   }
   if (number.value == 0.0) number.value = 0.0;  // -0 is 0
   const std::uint32_t raw = firmware::raw_from_number(entry.type, number.value);
+  if (entry.type == Type::float32 && number.value != 0.0 && std::bit_cast<float>(raw) == 0.0f)
+    fail(parameter,
+         fmt::format(
+             "{} is too small for a 32-bit float, which would make it 0; write 0 if that is meant ({})",
+             number.as_given, allowed_text(parameter)));
   if (firmware::check_value(firmware::descriptors[parameter.entry()], raw) != firmware::Refusal::none)
     fail_out_of_range(parameter, number);
   return raw;

@@ -11,6 +11,7 @@
 #include "host_tools/base/errors.hpp"
 #include "host_tools/base/files.hpp"
 #include "host_tools/base/interruption.hpp"
+#include "host_tools/base/numbers.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/base/progress.hpp"
 #include "host_tools/device/capture_reader.hpp"
@@ -32,7 +33,7 @@ namespace {
 struct CaptureOptions {
   CaptureSettings settings{.channels = {"position", "velocity", "force", "current"}};
   std::string trigger{device::name_of(CaptureTrigger::now)};
-  std::optional<double> level;
+  std::string level;
   double timeout = 30;
   std::string file;
   bool arm = false;
@@ -53,7 +54,7 @@ struct CaptureOptions {
         ->type_name("now|contact|force|velocity|fault|excitation")
         ->option_text("TRIGGER");
     command.add_option("--level", level, "Level of the triggers force (N) and velocity (m/s)")
-        ->check(CLI::NonNegativeNumber);
+        ->type_name("NUMBER");
     command.add_option("--pre-trigger", settings.pre_trigger, "Samples from before the trigger")
         ->capture_default_str();
     command.add_option("--samples", settings.samples, "Samples in all; 0: as many as fit")
@@ -154,17 +155,28 @@ Captured capture(Context& context, device::Device& device, const CaptureOptions&
   return reader.read(show);
 }
 
+/// What is measured decides the unit.
+double level_of(const std::string& text, CaptureTrigger trigger) {
+  const char* const unit = trigger == CaptureTrigger::force ? "N" : "m/s";
+  constexpr double most = 1e6;
+  const std::string allowed = fmt::format("0 .. {} {}", base::number_text(most), unit);
+  const base::WrittenNumber number = base::written_number(text, unit, "a number", allowed);
+  if (number.value < 0.0 || number.value > most)
+    throw UsageError(fmt::format("--level: {} is not in range {}", number.as_given, allowed));
+  return number.value;
+}
+
 CaptureOptions checked(const CaptureOptions& given, const Context& context) {
   CaptureOptions options = given;
   options.settings.axis = context.axis();
   const CaptureTrigger trigger = options.settings.trigger = device::capture_trigger_of(options.trigger);
   const bool takes_level = trigger == CaptureTrigger::force || trigger == CaptureTrigger::velocity;
-  if (takes_level && !options.level)
+  if (takes_level && options.level.empty())
     throw UsageError(fmt::format("--trigger {} needs --level", device::name_of(trigger)));
-  if (!takes_level && options.level)
+  if (!takes_level && !options.level.empty())
     throw UsageError(fmt::format("--level belongs to the triggers force and velocity, not to '{}'",
                                  device::name_of(trigger)));
-  if (options.level) options.settings.level = *options.level;
+  if (takes_level) options.settings.level = level_of(options.level, trigger);
   return options;
 }
 

@@ -93,8 +93,7 @@ TEST(Unit, EveryUnitOfTheDictionaryIsItsOwnSuffix) {
   for (std::size_t i = 0; i < firmware::entry_count; ++i) {
     const auto unit = firmware::entry_at(i).unit;
     EXPECT_EQ(convert(1, unit, unit), 1.0) << unit;
-    for (const std::string& suffix : suffixes_of(unit))
-      EXPECT_GT(convert(1, suffix, unit), 0.0) << suffix;
+    for (const std::string& suffix : suffixes_of(unit)) EXPECT_GT(convert(1, suffix, unit), 0.0) << suffix;
   }
 }
 
@@ -125,7 +124,7 @@ TEST(WrittenNumber, AnythingElseIsRefused) {
         [&] { written_number(text, unit, "a number", "0 .. 1 kg"); });
   };
   for (const char* text : {"", "heavy", "nan", "inf", "-inf", "+-1", "--1", "e5"})
-    EXPECT_EQ(refusal(text, "kg"), fmt::format("'{}' is not a number", text));
+    EXPECT_EQ(refusal(text, "kg"), fmt::format("'{}' is not a number; allowed is 0 .. 1 kg", text));
   EXPECT_EQ(refusal("1e400", "kg"), "1e400 is not a number this program can hold; allowed is 0 .. 1 kg");
   EXPECT_EQ(refusal("5 N", "kg"),
             "'5 N': 'N' is not one of its units kg, g, mg; without a unit the number is in kg");
