@@ -12,12 +12,9 @@
 namespace kmax::cli {
 
 // Each is in the file of its name.
-void add_max_stiffness_experiment(CLI::App& experiment, Context& context);
-void add_contact_experiment(CLI::App& experiment, Context& context);
-void add_jitter_experiment(CLI::App& experiment, Context& context);
-void add_deviation_experiment(CLI::App& experiment, Context& context);
-void add_resolution_experiment(CLI::App& experiment, Context& context);
-void add_wall_test_experiment(CLI::App& experiment, Context& context);
+using AddExperiment = void(CLI::App& experiment, Context& context);
+AddExperiment add_max_stiffness_experiment, add_contact_experiment, add_jitter_experiment,
+    add_deviation_experiment, add_resolution_experiment, add_wall_test_experiment;
 
 void add_experiment_command(CLI::App& app, Context& context) {
   auto* experiment =
