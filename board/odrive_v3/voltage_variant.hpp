@@ -14,12 +14,21 @@ namespace kmax::board::odrive_v3 {
 
 enum class VoltageVariant : std::uint8_t { v24, v56 };
 
-/// Where the maker's record of a v3 begins (its layout: registers/system_memory.hpp). Nothing for a blank,
-/// damaged or unknown one. (The maker's firmware reads the first record only, its tools skip void ones.)
+/// The maker's record about the board: a first byte of 0 voids it and the next record starts 16 bytes on.
+namespace otp {
+inline constexpr std::uint32_t record_bytes = 16;
+inline constexpr std::uint32_t magic_offset = 0;
+inline constexpr std::uint8_t magic = 0xFE;
+inline constexpr std::uint32_t version_major_offset = 3;
+inline constexpr std::uint32_t version_minor_offset = 4;
+inline constexpr std::uint32_t voltage_offset = 5;  // of the variant, in volts: 24 or 56
+}  // namespace otp
+
+/// Where the maker's record of a v3 begins. Nothing for a blank, damaged or unknown one. (The maker's firmware
+/// reads the first record only, its tools skip void ones.)
 /// `byte_at(i)`: byte i of the area.
 template <typename ByteAt>
 constexpr std::optional<std::size_t> maker_record(ByteAt byte_at) {
-  namespace otp = drivers::stm32f4::odrive_otp;
   for (std::size_t record = 0; record < drivers::stm32f4::otp_bytes; record += otp::record_bytes) {
     const std::uint8_t magic = byte_at(record + otp::magic_offset);
     if (magic == 0x00) continue;
@@ -34,7 +43,7 @@ template <typename ByteAt>
 constexpr std::optional<VoltageVariant> voltage_variant_from_otp(ByteAt byte_at) {
   const auto record = maker_record(byte_at);
   if (!record) return std::nullopt;
-  switch (byte_at(*record + drivers::stm32f4::odrive_otp::voltage_offset)) {
+  switch (byte_at(*record + otp::voltage_offset)) {
     case 24:
       return VoltageVariant::v24;
     case 48:
@@ -53,8 +62,7 @@ template <typename ByteAt>
 constexpr bool boot_loader_is_safe(ByteAt byte_at) {
   constexpr std::uint8_t first_safe_minor = 5, blank = 0xFF;
   const auto record = maker_record(byte_at);
-  return record ? byte_at(*record + drivers::stm32f4::odrive_otp::version_minor_offset) >= first_safe_minor
-                : byte_at(0) == blank;
+  return record ? byte_at(*record + otp::version_minor_offset) >= first_safe_minor : byte_at(0) == blank;
 }
 
 /// For a board whose area is blank: set with -DKMAX_ODRIVE_VOLTAGE=24 or 56 when configuring. 56 is the safe

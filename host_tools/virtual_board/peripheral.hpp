@@ -75,4 +75,13 @@ inline void require_word(const Access& access, const char* block) {
   throw RefusedAccess(std::string(block) + ", offset " + std::to_string(access.offset) + ": " + why);
 }
 
+/// Something with events of its own in the board's order of time that is not on the bus.
+class OffTheBus : public Peripheral {
+ public:
+  std::uint32_t read(const Access& access) override { refuse(access, "off the bus", "it has no registers"); }
+  void write(const Access& access, std::uint32_t /*value*/) override {
+    refuse(access, "off the bus", "it has no registers");
+  }
+};
+
 }  // namespace kmax::virtual_board

@@ -62,7 +62,7 @@ class Row {
                 {"axis1.wall.law", std::string("adaptive")}}) {
     bench_.start();
     for (std::size_t axis = 0; axis < armed; ++axis) bench_.master->arm(axis);
-    instructions_ = bench_.board->processor().instructions();
+    instructions_ = bench_.board->chip().processor().instructions();
   }
   void measure(double contact_speed) {
     constexpr double duration = 1.0;
@@ -72,7 +72,7 @@ class Row {
     by_contact_.push_back(speeds_.back() / contact_speed);
   }
   void print(double published) const {
-    const auto instructions = bench_.board->processor().instructions() - instructions_;
+    const auto instructions = bench_.board->chip().processor().instructions() - instructions_;
     fmt::print("{:<18} {:>6.2f} {:>14.1f} {:>15.2f}\n", name_, median(speeds_),
                1e-6 * static_cast<double>(instructions) / static_cast<double>(speeds_.size()),
                median(by_contact_) * published);

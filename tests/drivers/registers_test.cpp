@@ -657,12 +657,6 @@ TEST(Registers, KeysAndCodesAreThoseOfTheManual) {
   EXPECT_EQ(unique_id_base, 0x1FFF'7A10U);
   EXPECT_EQ(unique_id_bytes, 12U);
   EXPECT_EQ(flash_size_base, 0x1FFF'7A22U);
-  EXPECT_EQ(odrive_otp::record_bytes, 16U);
-  EXPECT_EQ(odrive_otp::magic_offset, 0U);
-  EXPECT_EQ(odrive_otp::magic, 0xFE);
-  EXPECT_EQ(odrive_otp::version_major_offset, 3U);
-  EXPECT_EQ(odrive_otp::version_minor_offset, 4U);
-  EXPECT_EQ(odrive_otp::voltage_offset, 5U);
 
   for (unsigned line = 0; line < 24; ++line) {
     const std::optional<Interrupt> expected = line == 2                ? std::optional(Interrupt::exti2)

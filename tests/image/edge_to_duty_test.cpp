@@ -88,7 +88,7 @@ TEST(EdgeToDuty, TheSampleAfterAnEdgeSetsTheDutyOfItsOwnTick) {
     const double phase = static_cast<double>(random() % 1000) / 1000.0;
     board.run_until(board.now() + ticks(60.0 + phase));
     world.extra_edges = world.extra_edges == 0 ? -2 : 0;
-    board.encoder_timer(0).set_encoder_count(world.encoder(0, board.now()).edges);
+    board.chip().peripherals().general_timers[0].set_encoder_count(world.encoder(0, board.now()).edges);
     edge = board.now();
     before = world.duty;
     waiting = true;

@@ -41,7 +41,7 @@ inline virtual_board::BoardTime ticks(double count) {
 /// The variant of the board for 24 V.
 inline std::unique_ptr<virtual_board::VirtualBoard> board_for_24_v(
     virtual_board::BoardWorld* world, virtual_board::VirtualBoardConfig config = {}) {
-  config.identity.volts = 24;
+  config.maker_record.volts = 24;
   return std::make_unique<virtual_board::VirtualBoard>(image(), world, config);
 }
 

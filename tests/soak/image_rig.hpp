@@ -82,7 +82,7 @@ class ImageRig final : public Rig {
   static base::ElfSymbol symbol(const std::string& name) { return tests::image().required_symbol(name); }
   static base::ElfSymbol application() { return symbol("_ZN4kmax5board12_GLOBAL__N_111applicationE"); }
   std::uint32_t& word(std::uint32_t address) {
-    return *reinterpret_cast<std::uint32_t*>(board_.bus().memory(address, 4).data());
+    return *reinterpret_cast<std::uint32_t*>(board_.chip().bus().memory(address, 4).data());
   }
   Words words() {
     Words all;
@@ -92,7 +92,7 @@ class ImageRig final : public Rig {
   }
   std::span<std::uint8_t> stack() {
     const std::uint32_t bottom = symbol("kmax_stack_bottom").address;
-    return board_.bus().memory(bottom, symbol("kmax_stack_top").address - bottom);
+    return board_.chip().bus().memory(bottom, symbol("kmax_stack_top").address - bottom);
   }
   /// Bytes that have been in use since the stack was painted, by the deepest of all starts.
   std::size_t deepest() {

@@ -20,7 +20,7 @@ class TickWatch {
  public:
   explicit TickWatch(virtual_board::VirtualBoard& board) : board_(board) {
     const std::uint32_t handler = tests::image().required_symbol("ISR_adc").address;
-    board.processor().on_block([this, handler](std::uint32_t address, std::uint32_t) {
+    board.chip().processor().on_block([this, handler](std::uint32_t address, std::uint32_t) {
       if (address != handler || paused_) return;
       const BoardTime now = board_.now();
       if (last_) {

@@ -53,7 +53,7 @@ std::vector<std::uint8_t> BoardLink::exchange_once(std::span<const std::uint8_t>
     return reply;
   }
   throw device::LinkError(fmt::format("the board does not answer within 0.6 s: {} of {} bytes; {} resets, {}",
-                                      reply.size(), expected, board_.resets() - 1, board_.where()));
+                                      reply.size(), expected, board_.resets() - 1, board_.chip().where()));
 }
 
 void BoardLink::arm(std::size_t axis) {

@@ -191,7 +191,7 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
   };
   std::map<std::uint32_t, Place> places;
   for (const std::uint32_t address : unique) {
-    const std::uint32_t code = board.bus().load(address).value_or(0);
+    const std::uint32_t code = board.chip().bus().load(address).value_or(0);
     places[address] = {step_of(frames.at(address)), decode(static_cast<std::uint16_t>(code),
                                                            static_cast<std::uint16_t>(code >> 16), address)};
   }

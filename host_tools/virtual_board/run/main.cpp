@@ -36,7 +36,7 @@ struct Options {
 class StoreFile {
  public:
   StoreFile(const std::string& path, virtual_board::VirtualBoard& board)
-      : file_(path), sectors_(board.bus()) {
+      : file_(path), sectors_(board.chip().bus()) {
     copy(file_, sectors_);
   }
   ~StoreFile() { copy(sectors_, file_); }
@@ -76,7 +76,7 @@ int run(const Options& options) {
                scene.name);
   }
   virtual_board::VirtualBoardConfig config;
-  config.identity.volts = static_cast<std::uint8_t>(options.volts);
+  config.maker_record.volts = static_cast<std::uint8_t>(options.volts);
   if (options.budget) {
     const auto report = virtual_board::measure_budget(options.elf, scene, config);
     fmt::print("{}", options.json ? virtual_board::budget_json(report) : virtual_board::budget_table(report));
@@ -121,7 +121,7 @@ int run(const Options& options) {
       bench ? &*bench : nullptr, usb ? &*usb : nullptr, options.duration,
       options.free_running ? nullptr : &pace, [&] { return interruption.requested(); });
   fmt::print(stderr, "{:.3f} s of board time, {} resets, {:.1f} million instructions\n", simulated_s,
-             board.resets() - 1, static_cast<double>(board.processor().instructions()) * 1e-6);
+             board.resets() - 1, static_cast<double>(board.chip().processor().instructions()) * 1e-6);
   if (pace.behind_s() > 0.0)
     fmt::print(stderr, "this machine was too slow or busy: {:.3f} s of real time were not simulated\n",
                pace.behind_s());

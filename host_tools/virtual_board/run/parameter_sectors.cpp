@@ -35,7 +35,7 @@ bool ParameterSectors::program(std::size_t sector, std::size_t word, std::uint32
 }
 
 void store_parameters(VirtualBoard& board, const std::vector<device::Assignment>& assignments) {
-  ParameterSectors sectors(board.bus());
+  ParameterSectors sectors(board.chip().bus());
   firmware::ParameterStore<ParameterSectors> store(sectors);
   firmware::ParameterValues values;
   static_cast<void>(store.load(values));

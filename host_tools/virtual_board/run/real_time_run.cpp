@@ -35,7 +35,7 @@ class CanBridge {
   /// Hands over what has come since the last call.
   void exchange() {
     constexpr std::size_t most_waiting = 64;
-    if (const BoardTime bit_time = board_.can_node().bit_time(); bit_time != 0)
+    if (const BoardTime bit_time = board_.chip().peripherals().can1.node()->bit_time(); bit_time != 0)
       node_.set_bit_time(bit_time, board_.now());
     // What the bus cannot take waits with the host, whose own queue is bounded.
     if (node_.waiting() >= most_waiting) return;

@@ -32,9 +32,9 @@ TickRecorder::TickRecorder(const base::ElfImage& image, VirtualBoard& board)
               .required_symbol("_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputERKNS1_"
                                "7CommandEm")
               .address) {
-  board.processor().on_block(
+  board.chip().processor().on_block(
       [this](std::uint32_t address, std::uint32_t size) { begin_block(address, size); });
-  board.processor().on_data_access([this](std::uint32_t address) { note_access(address); });
+  board.chip().processor().on_data_access([this](std::uint32_t address) { note_access(address); });
 }
 
 void TickRecorder::start() {
@@ -53,16 +53,16 @@ std::vector<RecordedTick> TickRecorder::take() {
 
 void TickRecorder::begin_block(std::uint32_t address, std::uint32_t size) {
   if (!recording_) return;
-  const auto& exceptions = board_.core().exceptions;
+  const auto& exceptions = board_.chip().core().exceptions;
   constexpr unsigned conversions = exception_of(Interrupt::adc);
   if (address == handler_) {
     ticks_.emplace_back();
-    waits_before_ = board_.bus().register_waits();
+    waits_before_ = board_.chip().bus().register_waits();
     open_ = true;
   }
   // The first block behind the tick closes it.
   in_tick_ = false;
-  if (open_) ticks_.back().register_waits = board_.bus().register_waits() - waits_before_;
+  if (open_) ticks_.back().register_waits = board_.chip().bus().register_waits() - waits_before_;
   open_ = open_ && exceptions.active(conversions);
   if (ticks_.empty()) return;
   if (exceptions.execution_level({}) == ExceptionTable::base_level)
@@ -72,8 +72,9 @@ void TickRecorder::begin_block(std::uint32_t address, std::uint32_t size) {
     return;
   in_tick_ = true;
   RecordedTick& tick = ticks_.back();
-  if (address == axis_tick_) tick.object = board_.processor().core_register(0);
-  each_instruction(board_.bus(), address, size, [&tick](std::uint32_t at) { tick.addresses.push_back(at); });
+  if (address == axis_tick_) tick.object = board_.chip().processor().core_register(0);
+  each_instruction(board_.chip().bus(), address, size,
+                   [&tick](std::uint32_t at) { tick.addresses.push_back(at); });
 }
 
 void TickRecorder::note_access(std::uint32_t address) {
@@ -83,7 +84,7 @@ void TickRecorder::note_access(std::uint32_t address) {
 
 std::uint64_t TickRecorder::instructions_in(std::uint32_t address, std::uint32_t size) {
   std::uint64_t& known = lengths_[address];
-  if (known == 0) each_instruction(board_.bus(), address, size, [&known](std::uint32_t) { ++known; });
+  if (known == 0) each_instruction(board_.chip().bus(), address, size, [&known](std::uint32_t) { ++known; });
   return known;
 }
 

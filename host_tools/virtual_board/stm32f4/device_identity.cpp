@@ -6,7 +6,6 @@ namespace kmax::virtual_board {
 
 namespace {
 namespace stm32 = drivers::stm32f4;
-namespace otp = stm32::odrive_otp;
 namespace dbgmcu_apb1_fz = stm32::dbgmcu_apb1_fz;
 namespace dbgmcu_apb2_fz = stm32::dbgmcu_apb2_fz;
 constexpr const char* system_memory = "system memory";
@@ -21,14 +20,9 @@ DeviceIdentity::DeviceIdentity(const Identity& identity) {
     bytes_[address - base] = byte;
     known_[address - base] = true;
   };
-  for (std::uint32_t i = 0; i < stm32::otp_bytes; ++i) put(stm32::otp_base + i, 0xFF);
+  for (std::uint32_t i = 0; i < stm32::otp_bytes; ++i)
+    put(stm32::otp_base + i, identity.one_time_programmable[i]);
   for (std::uint32_t i = 0; i < stm32::otp_lock_bytes; ++i) put(stm32::otp_lock_base + i, 0xFF);
-  if (identity.board_record) {
-    put(stm32::otp_base + otp::magic_offset, otp::magic);
-    put(stm32::otp_base + otp::version_major_offset, identity.version_major);
-    put(stm32::otp_base + otp::version_minor_offset, identity.version_minor);
-    put(stm32::otp_base + otp::voltage_offset, identity.volts);
-  }
   for (std::uint32_t i = 0; i < stm32::unique_id_bytes; ++i)
     put(stm32::unique_id_base + i, static_cast<std::uint8_t>(identity.unique_id[i / 4] >> (8 * (i % 4))));
   put(stm32::flash_size_base, static_cast<std::uint8_t>(identity.flash_kib));

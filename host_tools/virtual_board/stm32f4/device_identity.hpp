@@ -13,11 +13,11 @@ namespace kmax::virtual_board {
 struct Identity {
   std::array<std::uint32_t, 3> unique_id{0x0032'0021, 0x3335'5108, 0x3832'3436};
   std::uint16_t flash_kib = 1024;
-  bool board_record =
-      true;  ///< false: the OTP is blank (0xFF), as on a board that did not come from its maker
-  std::uint8_t version_major = 3;
-  std::uint8_t version_minor = 6;
-  std::uint8_t volts = 56;
+  std::array<std::uint8_t, drivers::stm32f4::otp_bytes> one_time_programmable = [] {
+    std::array<std::uint8_t, drivers::stm32f4::otp_bytes> blank;
+    blank.fill(0xFF);
+    return blank;
+  }();
 };
 
 /// One-time programmable bytes, unique identifier and flash size: RM0090, chapters Embedded Flash memory
@@ -41,7 +41,7 @@ class DeviceIdentity final : public Peripheral {
 };
 
 /// Debug support block: RM0090, chapter Debug support (DBG), section MCU debug component (DBGMCU). Identity
-/// and the freeze bits, which count while a debugger halts the core (VirtualBoard::halt). Bits of peripherals
+/// and the freeze bits, which count while a debugger halts the core (Stm32f405::halt). Bits of peripherals
 /// that the board does not have, and CR, are refused. System reset does not touch it.
 class DbgmcuModel final : public RegisterBlock<DbgmcuModel> {
  public:

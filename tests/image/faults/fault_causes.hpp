@@ -142,8 +142,8 @@ inline std::vector<Cause> fault_causes() {
   Cause converters{"converters stand still",
                    [](Bench& b, std::size_t) {
                      using namespace drivers::stm32f4;
-                     b.board->bus().write(adc_base + adc_stride + offsetof(AdcRegisters, cr2), 4, 0,
-                                          b.board->now());
+                     b.board->chip().bus().write(adc_base + adc_stride + offsetof(AdcRegisters, cr2), 4, 0,
+                                                 b.board->now());
                    },
                    [](Bench&, std::size_t) {},
                    Hits::both,
@@ -166,8 +166,10 @@ inline std::vector<Cause> fault_causes() {
       sensor("current sensor at rest", Channel::b, 0.0, Fault::phase_open, slow_tick, Refusal::none),
       moment(
           "timer's break",
-          [](Bench& b, std::size_t a) { b.board->pwm(a).clock_failure_break(b.board->now()); }, Hits::axis,
-          Fault::power_stage, by_line),
+          [](Bench& b, std::size_t a) {
+            b.board->chip().peripherals().advanced_timers[a].clock_failure_break(b.board->now());
+          },
+          Hits::axis, Fault::power_stage, by_line),
       moment(
           "gate driver: a FET carries too much",
           [](Bench& b, std::size_t a) {

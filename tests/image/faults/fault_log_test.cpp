@@ -38,11 +38,11 @@ class Bench : public CanBench {
   }
   /// An instruction of the image that looks like this is next.
   std::uint32_t go_on_with(std::uint16_t instruction, std::uint16_t mask) {
-    const auto flash = board->bus().flash();
+    const auto flash = board->chip().bus().flash();
     for (std::size_t at = 98 * sizeof(std::uint32_t); at + 1 < flash.size(); at += 2) {
       if (((flash[at] | flash[at + 1] << 8) & mask) != instruction) continue;
       const auto address = static_cast<std::uint32_t>(virtual_board::memory_map::flash.base + at);
-      board->processor().set_core_register(15, address);
+      board->chip().processor().set_core_register(15, address);
       return address;
     }
     throw std::runtime_error("the image does not have the instruction");
@@ -128,12 +128,12 @@ TEST(ImageFaultLog, NamesTheCrashOnceAndWhereItWas) {
   bench.start();
   std::uint32_t at = 0;
   for (unsigned crashes = 1; crashes <= 2; ++crashes) {
-    const auto flash = bench.board->bus().flash();
+    const auto flash = bench.board->chip().bus().flash();
     for (at = 0xC000; (flash[at + 1]) != 0xDE; at += 2) {
     }
     at += static_cast<std::uint32_t>(virtual_board::memory_map::flash.base);
-    bench.board->processor().set_core_register(14, at);  // else where the main loop happened to be
-    bench.board->processor().set_core_register(15, at);
+    bench.board->chip().processor().set_core_register(14, at);  // else where the main loop happened to be
+    bench.board->chip().processor().set_core_register(15, at);
     bench.board->run_for(0.2);
     bench.start();
     const auto log = device::read_fault_log(*bench.master);
@@ -158,7 +158,7 @@ TEST(ImageFaultLog, AResetInTheMiddleOfAnEntryLeavesItWholeOrOut) {
   std::size_t entries = 0, with = 0, without = 0;
   const base::ElfSymbol log_memory =
       tests::image().required_symbol("_ZN4kmax5board12_GLOBAL__N_110log_memoryE");
-  const auto memory = bench.board->bus().memory(log_memory.address, log_memory.size);
+  const auto memory = bench.board->chip().bus().memory(log_memory.address, log_memory.size);
   // Later each time, from its first store on to behind the ticks of both axes, which may come in between.
   constexpr double step = 0.7e-6;
   for (int i = 0; i < 40; ++i) {

@@ -53,13 +53,13 @@ class Bench : public ImageBench {
   /// An endless loop is next, whatever runs.
   void hang() { go_on_at(address_of(0xE7FE, 0xFFFF)); }
   std::uint32_t address_of(std::uint16_t instruction, std::uint16_t mask) {
-    const auto flash = board->bus().flash();
+    const auto flash = board->chip().bus().flash();
     for (std::size_t at = 98 * sizeof(std::uint32_t); at + 1 < flash.size(); at += 2)
       if (((flash[at] | flash[at + 1] << 8) & mask) == instruction)
         return static_cast<std::uint32_t>(virtual_board::memory_map::flash.base + at);
     throw std::runtime_error("the image does not have the instruction");
   }
-  void go_on_at(std::uint32_t address) { board->processor().set_core_register(15, address); }
+  void go_on_at(std::uint32_t address) { board->chip().processor().set_core_register(15, address); }
   /// Until the condition holds, a block of instructions after the other.
   void run_until(const std::function<bool()>& condition) {
     for (int i = 0; i < 1'000'000 && !condition(); ++i) board->run_until(board->now() + 1);
@@ -131,22 +131,23 @@ TEST(HaltAndHang, AHaltTakesTheForceWithinAPwmPeriodAndItDoesNotComeBack) {
   for (int i = 0; i < count(25, 1000); ++i) {
     ASSERT_NO_FATAL_FAILURE(bench.drive());
     bench.run_to_any_moment(random);
-    bench.board->halt();
+    bench.board->chip().halt();
     const auto off = bench.time_to_off(longest);
     times.add(off);
     EXPECT_LE(off.gates, tick_s) << i;
     EXPECT_LE(off.brake, tick_s) << i;
     if (testing::Test::HasFailure()) {
-      bench.board->resume();
+      bench.board->chip().resume();
       continue;  // enough is known
     }
     bench.board->run_for(i % 100 == 0 ? 3.0 : 1e-6 * static_cast<double>(random() % 3000));
     EXPECT_TRUE(bench.gates_off()) << i;
     EXPECT_FALSE(bench.board->brake().on()) << i;
-    bench.board->resume();
+    bench.board->chip().resume();
     for (int step = 0; step < 400; ++step) {
       bench.board->run_for(2.5e-6);
-      ASSERT_TRUE(bench.gates_off()) << i << ": the force comes back by itself, at " << bench.board->where();
+      ASSERT_TRUE(bench.gates_off()) << i << ": the force comes back by itself, at "
+                                     << bench.board->chip().where();
     }
     for (std::size_t axis = 0; axis < axes; ++axis)
       EXPECT_EQ(firmware::text_of(bench.fault(axis)).name, std::string("tick_missed")) << i;
@@ -163,12 +164,13 @@ TEST(HaltAndHang, TheTimersAreNotFrozenWhateverADebuggerSets) {
     Bench bench(config);
     bench.drive();
     using namespace drivers::stm32f4;
-    bench.board->bus().write(dbgmcu_base + offsetof(DbgmcuRegisters, apb2_fz), 4,
-                             dbgmcu_apb2_fz::Timer1::mask | dbgmcu_apb2_fz::Timer8::mask, bench.board->now());
+    bench.board->chip().bus().write(dbgmcu_base + offsetof(DbgmcuRegisters, apb2_fz), 4,
+                                    dbgmcu_apb2_fz::Timer1::mask | dbgmcu_apb2_fz::Timer8::mask,
+                                    bench.board->now());
     bench.board->run_for(2e-3);
-    bench.board->halt();
+    bench.board->chip().halt();
     EXPECT_LE(bench.time_to_off(longest).gates, tick_s);
-    bench.board->resume();
+    bench.board->chip().resume();
     for (int step = 0; step < 400; ++step) {
       bench.board->run_for(2.5e-6);
       ASSERT_TRUE(bench.gates_off());
@@ -182,7 +184,7 @@ TEST(HaltAndHang, DrivesWhateverTheBreakInputReads) {
   config.break_inputs_high = true;
   Bench bench(config);
   bench.drive();
-  bench.board->rcc().fail_crystal(bench.board->now());
+  bench.board->chip().peripherals().rcc.fail_crystal(bench.board->now());
   EXPECT_TRUE(bench.gates_off()) << "the clock's break still works";
 }
 
@@ -208,7 +210,7 @@ struct Hang {
 };
 
 void hang_the_tick(Bench& bench) {
-  const auto in_tick = [&] { return bench.board->core().exceptions.active(conversions); };
+  const auto in_tick = [&] { return bench.board->chip().core().exceptions.active(conversions); };
   // Behind its first block, but not behind its last one: that would be the main loop.
   do {
     bench.run_until(in_tick);
@@ -219,19 +221,20 @@ void hang_the_tick(Bench& bench) {
 void lock_the_core_up(Bench& bench) {
   const std::uint32_t undefined = bench.address_of(0xDE00, 0xFF00);
   bench.go_on_at(undefined);
-  bench.run_until([&] { return bench.board->core().exceptions.active(hard_fault); });
+  bench.run_until([&] { return bench.board->chip().core().exceptions.active(hard_fault); });
   bench.go_on_at(undefined);
-  bench.run_until([&] { return bench.board->processor().locked_up(); });
+  bench.run_until([&] { return bench.board->chip().processor().locked_up(); });
 }
 void stop_the_converters(Bench& bench) {
   using namespace drivers::stm32f4;
-  bench.board->bus().write(adc_base + adc_stride + offsetof(AdcRegisters, cr2), 4, 0, bench.board->now());
+  bench.board->chip().bus().write(adc_base + adc_stride + offsetof(AdcRegisters, cr2), 4, 0,
+                                  bench.board->now());
 }
 
 void hang_the_main_loop(Bench& bench, bool masked) {
   bench.run_until([&] {
-    return bench.board->core().exceptions.active_count() == 0 &&
-           bench.board->processor().masks().primask == masked;
+    return bench.board->chip().core().exceptions.active_count() == 0 &&
+           bench.board->chip().processor().masks().primask == masked;
   });
   bench.hang();
 }

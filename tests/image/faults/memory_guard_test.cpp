@@ -68,7 +68,7 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
       EXPECT_TRUE(bench.board->bridge_armed(axis));
     }
     // An endless loop, should it ever be reached.
-    bench.board->bus().store(0x2001'8000, 0xE7FE'E7FE);
+    bench.board->chip().bus().store(0x2001'8000, 0xE7FE'E7FE);
   }
 
   static virtual_board::VirtualBoardConfig as_on_the_chip() {
@@ -78,7 +78,7 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
   }
 
   std::uint32_t address_of(std::uint16_t instruction) {
-    const auto flash = bench.board->bus().flash();
+    const auto flash = bench.board->chip().bus().flash();
     for (std::size_t at = 0xC000; at + 1 < flash.size(); at += 2) {
       if ((flash[at] | flash[at + 1] << 8) == instruction)
         return static_cast<std::uint32_t>(0x0800'0000 + at);
@@ -93,15 +93,15 @@ class MemoryGuard : public testing::TestWithParam<Mishap> {
     // In the main loop: asleep, with interrupts that wait for the core to wake; or where one may come, if
     // what is run next would not let it.
     const bool asleep = mishap.program_counter == 0;
-    while (board.core().exceptions.active_count() != 0 ||
-           (asleep ? !board.processor().sleeping() : board.processor().masks().primask))
+    while (board.chip().core().exceptions.active_count() != 0 ||
+           (asleep ? !board.chip().processor().sleeping() : board.chip().processor().masks().primask))
       board.run_for(1e-6);
-    board.processor().set_core_register(13, mishap.stack_pointer);
-    board.processor().set_core_register(0, mishap.r0);
-    board.processor().set_core_register(1, stored);
+    board.chip().processor().set_core_register(13, mishap.stack_pointer);
+    board.chip().processor().set_core_register(0, mishap.r0);
+    board.chip().processor().set_core_register(1, stored);
     std::uint32_t next = mishap.program_counter;
     if (mishap.instruction != 0) next = address_of(mishap.instruction);
-    if (next != 0) board.processor().set_core_register(15, next);
+    if (next != 0) board.chip().processor().set_core_register(15, next);
     const auto begin = board.now();
     while (board.now() < begin + ticks(2)) {
       board.run_for(0.1e-6);
@@ -137,18 +137,18 @@ TEST_P(MemoryGuard, TurnsAMishapIntoANamedFault) {
 
 TEST_P(MemoryGuard, IsWhatCatchesIt) {
   const Mishap& mishap = GetParam();
-  bench.board->core().memory_protection.write({offsetof(cortex::MpuRegisters, ctrl), 4, bench.board->now()},
-                                              0);
-  const auto before = bench.board->bus().load(mishap.r0);
+  bench.board->chip().core().memory_protection.write(
+      {offsetof(cortex::MpuRegisters, ctrl), 4, bench.board->now()}, 0);
+  const auto before = bench.board->chip().bus().load(mishap.r0);
   const double off = happen();
   if (mishap.unguarded == nullptr) {
     if (mishap.instruction == store_r1_at_r0) {
-      EXPECT_NE(bench.board->bus().load(mishap.r0), before)
+      EXPECT_NE(bench.board->chip().bus().load(mishap.r0), before)
           << "what follows in the image may change it again";
     }
     // What runs behind the access may fail, at another address.
     const auto of_the_core = [this](std::uint32_t offset) {
-      return bench.board->core().system_control.read({offset, 4, bench.board->now()});
+      return bench.board->chip().core().system_control.read({offset, 4, bench.board->now()});
     };
     const bool refused = (of_the_core(offsetof(cortex::ScbRegisters, cfsr)) &
                           cortex::scb_cfsr::BusFaultAddressValid::mask) != 0 &&

@@ -30,11 +30,11 @@ struct Upset {
 };
 
 void go_on_at(Bench& bench, std::uint32_t address) {
-  bench.board->processor().set_core_register(15, address);
+  bench.board->chip().processor().set_core_register(15, address);
 }
 /// An instruction of the image, behind its vectors, that looks like this.
 void go_on_with(Bench& bench, std::uint16_t instruction, std::uint16_t mask = 0xFFFF) {
-  const auto flash = bench.board->bus().flash();
+  const auto flash = bench.board->chip().bus().flash();
   for (std::size_t at = 98 * sizeof(std::uint32_t); at + 1 < flash.size(); at += 2) {
     if (((flash[at] | flash[at + 1] << 8) & mask) == instruction)
       return go_on_at(bench, static_cast<std::uint32_t>(virtual_board::memory_map::flash.base + at));
@@ -50,23 +50,23 @@ std::vector<Upset> upsets() {
       {"reset line pulled", [](Bench& b) { b.board->pull_reset(); }, handler, ResetCause::pin, ""},
       {"power off and on", [](Bench& b) { b.board->cycle_power(); }, handler, ResetCause::power_on, ""},
       // It goes on from the internal oscillator, at full speed.
-      {"crystal stops", [](Bench& b) { b.board->rcc().fail_crystal(b.board->now()); }, next_interrupt,
-       ResetCause::software, "exception 2 came, which nobody handles"},
+      {"crystal stops", [](Bench& b) { b.board->chip().peripherals().rcc.fail_crystal(b.board->now()); },
+       next_interrupt, ResetCause::software, "exception 2 came, which nobody handles"},
       {"crystal does not start at the next start",
        [](Bench& b) {
-         b.board->rcc().set_crystal_works(false);
+         b.board->chip().peripherals().rcc.set_crystal_works(false);
          b.board->pull_reset();
        },
        handler, ResetCause::pin, ""},
       // No power stage on a slow clock, and the axes say that they have no encoder.
       {"PLL does not lock at the next start",
        [](Bench& b) {
-         b.board->rcc().set_pll_locks(false);
+         b.board->chip().peripherals().rcc.set_pll_locks(false);
          b.board->pull_reset();
        },
        handler, ResetCause::pin, "",
        [](Bench& b) {
-         b.board->rcc().set_pll_locks(true);
+         b.board->chip().peripherals().rcc.set_pll_locks(true);
          b.board->pull_reset();
        },
        Refusal::encoder_invalid},
@@ -75,8 +75,8 @@ std::vector<Upset> upsets() {
       {"interrupt that nobody handles",
        [](Bench& b) {
          constexpr unsigned tim2 = 16 + 28;
-         b.board->core().exceptions.set_enabled(tim2, true);
-         b.board->core().exceptions.pend(tim2);
+         b.board->chip().core().exceptions.set_enabled(tim2, true);
+         b.board->chip().core().exceptions.pend(tim2);
        },
        next_interrupt, ResetCause::software, "interrupt 28 came, which nobody handles"},
       {"undefined instruction", [](Bench& b) { go_on_with(b, 0xDE00, 0xFF00); }, handler,
@@ -84,14 +84,14 @@ std::vector<Upset> upsets() {
       {"stack full",
        [](Bench& b) {
          const std::uint32_t bottom = tests::image().required_symbol("kmax_stack_bottom").address;
-         b.board->processor().set_core_register(stack_pointer, bottom + 16);
+         b.board->chip().processor().set_core_register(stack_pointer, bottom + 16);
        },
        next_interrupt, ResetCause::software, "stack overflow?"},
       {"jump into RAM", [](Bench& b) { go_on_at(b, 0x2001'8000); }, handler, ResetCause::software,
        "instruction fetch from where no code may be"},
       {"store through a null pointer",
        [](Bench& b) {
-         b.board->processor().set_core_register(0, 0);
+         b.board->chip().processor().set_core_register(0, 0);
          go_on_with(b, 0x6001);  // str r1, [r0]
        },
        handler, ResetCause::software, "data access that the memory protection forbids"},
@@ -119,7 +119,8 @@ TEST_P(NewStart, IsWhatThePageSays) {
     ASSERT_TRUE(bench.recover());
     for (std::size_t axis = 0; armed && axis < axes; ++axis) ASSERT_TRUE(bench.arm(axis));
     if (armed) bench.press();
-    while (!bench.board->processor().sleeping() || bench.board->core().exceptions.active_count() != 0)
+    while (!bench.board->chip().processor().sleeping() ||
+           bench.board->chip().core().exceptions.active_count() != 0)
       bench.board->run_for(1e-6);
     const auto resets = bench.board->resets();
     const BoardTime begin = bench.board->now();

@@ -32,8 +32,8 @@ class PowerCutBench {
   }
 
   std::span<std::uint8_t> sectors() {
-    return board_->bus().memory(virtual_board::memory_map::parameters.base,
-                                virtual_board::memory_map::parameters.size);
+    return board_->chip().bus().memory(virtual_board::memory_map::parameters.base,
+                                       virtual_board::memory_map::parameters.size);
   }
   std::vector<std::uint8_t> contents() { return {sectors().begin(), sectors().end()}; }
 
@@ -56,9 +56,9 @@ class PowerCutBench {
       master().write_register(register_address(entry_of<"store.command">(), 0), 1);
       for (int ms = 0; ms < 2000 && state() == 1; ++ms) board_->run_for(0.005);
     } catch (const std::runtime_error&) {
-      if (!board_->flash().power_is_cut()) throw;
+      if (!board_->chip().peripherals().flash.power_is_cut()) throw;
     }
-    return !board_->flash().power_is_cut();
+    return !board_->chip().peripherals().flash.power_is_cut();
   }
 
   std::uint16_t state() { return master().read_input(register_address(entry_of<"store.state">(), 0), 1)[0]; }
@@ -123,9 +123,9 @@ void cut_all_along(const std::vector<std::uint8_t>& before) {
     PowerCutBench bench(before);
     ASSERT_EQ(bench.get(), old_set);
     bench.set(new_set);
-    const auto start = bench.board().flash().operations();
+    const auto start = bench.board().chip().peripherals().flash.operations();
     ASSERT_TRUE(bench.save());
-    operations = bench.board().flash().operations() - start;
+    operations = bench.board().chip().peripherals().flash.operations() - start;
   }
   ASSERT_GT(operations, 100u);
   std::uint64_t old_sets = 0, new_sets = 0;
@@ -133,7 +133,7 @@ void cut_all_along(const std::vector<std::uint8_t>& before) {
     if (!is_tried(cut, operations)) continue;
     PowerCutBench bench(before);
     bench.set(new_set);
-    bench.board().flash().cut_power_after(cut, cut * 7919);
+    bench.board().chip().peripherals().flash.cut_power_after(cut, cut * 7919);
     ASSERT_FALSE(bench.save()) << "cut " << cut;
     const auto cut_at = bench.board().now();
     bench.board().cycle_power();

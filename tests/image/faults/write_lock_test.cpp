@@ -51,8 +51,8 @@ class Bench : public CanBench {
     while (number("store.state") == 1) board->run_for(5e-3);
   }
   std::span<std::uint8_t> stored() {
-    return board->bus().memory(flash::stm32f405_memory.parameters_begin(),
-                               flash::stm32f405_memory.parameters_size());
+    return board->chip().bus().memory(flash::stm32f405_memory.parameters_begin(),
+                                      flash::stm32f405_memory.parameters_size());
   }
 };
 

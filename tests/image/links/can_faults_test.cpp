@@ -52,12 +52,12 @@ class BusFaults : public testing::Test {
 // The internal oscillator is right within 1 %, a bus wants 0.5.
 TEST(BusClock, WithoutItsCrystalTheNodeStaysOffTheBus) {
   CanBench bench;
-  bench.board->rcc().set_crystal_works(false);
+  bench.board->chip().peripherals().rcc.set_crystal_works(false);
   bench.board->pull_reset();
   bench.start();
   EXPECT_EQ(bench.number("info.clock_source"), 1U) << "at full speed all the same";
   EXPECT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::stopped));
-  bench.board->rcc().set_crystal_works(true);
+  bench.board->chip().peripherals().rcc.set_crystal_works(true);
   bench.board->pull_reset();
   bench.start();
   EXPECT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::active));
@@ -87,7 +87,7 @@ TEST_F(BusFaults, BusOffAndBack) {
   bench.nmt(0x01);
   bench.board->run_for(0.01);
   // Every frame of this node is destroyed: 32 attempts later it is off the bus.
-  bench.board->can_bus().destroy_frames_of(&bench.board->can_node());
+  bench.board->can_bus().destroy_frames_of(bench.board->chip().peripherals().can1.node());
   bench.board->can_bus().destroy_frames(40);
   bench.board->run_for(0.02);
   expect_safe(Fault::bus_off);

@@ -292,7 +292,7 @@ TEST_F(UsbCanAdapter, ABabblingBusHoldsUpNeitherThePcNorTheNode) {
 TEST_F(UsbCanAdapter, CommandsOverUsbGoOnWhileTheBusIsOff) {
   ASSERT_TRUE(arm());
   flood(bus, 0x6F0);
-  bench.board->can_bus().destroy_frames_of(&bench.board->can_node());
+  bench.board->can_bus().destroy_frames_of(bench.board->chip().peripherals().can1.node());
   bench.board->can_bus().destroy_frames(40);
   bench.board->run_for(0.02);
   ASSERT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::bus_off));
@@ -361,7 +361,7 @@ TEST_F(UsbCanAdapter, ABusThatGoesOffTakesTheForceOfWhoCommandsOverIt) {
   ASSERT_TRUE(bench.board->bridge_armed(0));
   ASSERT_TRUE(pc.sdo_round_trip(node, upload_request(device_type))) << "the PC is there, and reads";
   flood(bus, 0x6F0);
-  bench.board->can_bus().destroy_frames_of(&bench.board->can_node());
+  bench.board->can_bus().destroy_frames_of(bench.board->chip().peripherals().can1.node());
   bench.board->can_bus().destroy_frames(40);
   bench.board->run_for(0.02);
   ASSERT_EQ(bench.number("can.state"), static_cast<unsigned>(firmware::CanState::bus_off));

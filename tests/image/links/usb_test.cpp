@@ -122,12 +122,12 @@ class BoardBehindAJump {
   using Nvic = drivers::cortex_m::NvicRegisters;
 
   void store(std::uint32_t address, std::uint32_t value) {
-    bench.board->bus().write(address, 4, value, bench.board->now());
+    bench.board->chip().bus().write(address, 4, value, bench.board->now());
   }
   void leave_clocks_on() {
     using namespace drivers::stm32f4;
     constexpr std::uint32_t control = rcc_base + offsetof(RccRegisters, cr);
-    store(control, bench.board->bus().read(control, 4, bench.board->now()) | rcc_cr::CrystalOn::mask);
+    store(control, bench.board->chip().bus().read(control, 4, bench.board->now()) | rcc_cr::CrystalOn::mask);
     store(rcc_base + offsetof(RccRegisters, ahb2enr), rcc_ahb2enr::OtgFs::mask);
   }
   /// Of the USB interrupt.
@@ -137,15 +137,15 @@ class BoardBehindAJump {
   /// The program from which the jump comes, with its own table, jumps out of its USB interrupt.
   void jump_out_of_a_handler() {
     constexpr std::uint32_t table = 0x2001'8000, handler = 0x2001'8400, loop = 0x2001'8500;
-    const std::uint32_t firmware = bench.board->processor().program_counter() | 1U;
-    bench.board->bus().store(table + (16 + interrupt) * 4, handler | 1U);
-    bench.board->bus().store(handler, 0xF000'F8DF);  // ldr pc, the word behind it
-    bench.board->bus().store(handler + 4, firmware);
-    bench.board->bus().store(loop, 0xE7FE'E7FE);  // b to itself
+    const std::uint32_t firmware = bench.board->chip().processor().program_counter() | 1U;
+    bench.board->chip().bus().store(table + (16 + interrupt) * 4, handler | 1U);
+    bench.board->chip().bus().store(handler, 0xF000'F8DF);  // ldr pc, the word behind it
+    bench.board->chip().bus().store(handler + 4, firmware);
+    bench.board->chip().bus().store(loop, 0xE7FE'E7FE);  // b to itself
     store(drivers::cortex_m::scb_base + offsetof(drivers::cortex_m::ScbRegisters, vtor), table);
     set(offsetof(Nvic, iser));
     set(offsetof(Nvic, ispr));
-    bench.board->processor().set_core_register(15, loop);
+    bench.board->chip().processor().set_core_register(15, loop);
   }
   void expect_one_reset_and_the_firmware() {
     bench.start();
@@ -166,7 +166,7 @@ TEST(ImageUsb, BehindAJumpThatLeavesUsbRunningItBeginsWithAReset) {
   board.set(offsetof(BoardBehindAJump::Nvic, iser));
   // The host goes on with its frames.
   const std::uint32_t program = image().required_symbol("main").address & ~1U;
-  board.bench.board->processor().on_block([&](std::uint32_t address, std::uint32_t) {
+  board.bench.board->chip().processor().on_block([&](std::uint32_t address, std::uint32_t) {
     if (address == program) board.set(offsetof(BoardBehindAJump::Nvic, ispr));
   });
   board.expect_one_reset_and_the_firmware();

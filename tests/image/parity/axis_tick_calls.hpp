@@ -21,7 +21,7 @@ class AxisTickCalls {
             .required_symbol(
                 "_ZN4kmax8firmware4Axis8ISR_tickERKNS0_11AxisSettingERKNS1_5InputERKNS1_7CommandEm")
             .address;
-    board.processor().on_block([this, entry](std::uint32_t address, std::uint32_t /*size*/) {
+    board.chip().processor().on_block([this, entry](std::uint32_t address, std::uint32_t /*size*/) {
       if (address == entry) {
         if (first_self_ == 0) first_self_ = self();
         axis_ = self() == first_self_ ? 0 : 1;
@@ -40,12 +40,12 @@ class AxisTickCalls {
   /// Of the present call: the axis, the address of its Axis, and the core registers with the arguments.
   std::size_t axis() const { return axis_; }
   std::uint32_t self() const { return argument(0); }
-  std::uint32_t argument(unsigned number) const { return board_.processor().core_register(number); }
+  std::uint32_t argument(unsigned number) const { return board_.chip().processor().core_register(number); }
 
   /// What lies in the image's memory; the same layout on both sides: whole numbers, floats and flags.
   template <typename Value>
   std::span<std::uint8_t> bytes_at(std::uint32_t address) const {
-    const auto bytes = board_.bus().memory(address, sizeof(Value));
+    const auto bytes = board_.chip().bus().memory(address, sizeof(Value));
     if (bytes.size() < sizeof(Value)) throw std::runtime_error("an argument outside memory");
     return bytes;
   }
