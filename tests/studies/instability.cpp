@@ -369,7 +369,7 @@ report::Page instability_page(const std::vector<RatioResult>& ratios, const Stab
       fmt::format("Walls of at most {:g} of the stiffness of a plain wall that is stable (less than 1 N peak "
                   "to peak) under the same hand in the same loop, the slope of a field included: 500 Hz to "
                   "20 kHz, encoders of 55, 23 and 5.5 um, resolutions of 0.1 and 0.4 mm, all laws, no "
-                  "damping or 0.5 to 3 N s/m, all velocity estimators; taps, presses that are let go of, "
+                  "damping or 0.5 to 3 N s/m, all velocity estimators but the edge period; taps, presses that are let go of, "
                   "holds, at 0.02 to 1.5 m/s with 0.2 to 1.5 N; half of them with a hand that trembles at 8 "
                   "to 12 Hz or presses more and less at 0.5 to 3 Hz; and handles that nobody holds, thrown "
                   "at 0.02 to 3 m/s with their weight on them. {} alarms in {} touches and {} throws ({} "

@@ -4,12 +4,14 @@ that nothing that happens to a program leaves its force on."""
 import contextlib
 import ctypes
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
 import unittest
+from pathlib import Path
 
 import kmax
 import numpy as np
@@ -90,6 +92,18 @@ class ReadsAndSets(AgainstAServedDevice):
         self.assertEqual(len(recording.time), 500 - recording.lost)
         self.assertAlmostEqual(recording.time[-1], 0.4995, delta=0.002)
         self.assertLess(np.ptp(recording.position), 1)
+
+    def test_the_program_of_the_readme(self):
+        readme = (Path(__file__).resolve().parents[2] / "README.md").read_text()
+        text = re.search(r"```python\n(.*?)```", readme, re.DOTALL)[1]
+        self.assertIn("can:/tmp/bus", text)
+        done = subprocess.run([sys.executable, "-c", text.replace("can:/tmp/bus", self.served.bus)], capture_output=True,
+                              text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        deepest, hardest = map(float, re.search(r"deepest (\S+) mm, hardest (\S+) N", done.stdout).groups())
+        self.assertGreater(deepest, 0, "the hand is in the wall")
+        self.assertGreater(hardest, 0)
+        self.assertRegex(done.stdout, r"\d+ cycles missed")
 
     def test_units_and_types(self):
         for address in self.served.bus, self.served.device:
