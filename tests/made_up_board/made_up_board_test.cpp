@@ -174,7 +174,8 @@ TEST(MadeUpTicks, RoundsOfThreeTicksAreTheMainLoopsRhythm) {
   int due = 0;
   constexpr int ticks = 4000;
   for (int tick = 0; tick < ticks; ++tick) {
-    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis) power.ISR_tick(axis, application);
+    for (std::size_t axis = 0; axis < firmware::axis_count; ++axis)
+      power.ISR_tick(axis, application.ISR_axes());
     power.hardware().advance(50e-6);
     if (!power.drives().main_loop_due()) continue;
     ++due;

@@ -7,7 +7,7 @@ namespace kmax::virtual_board {
 namespace {
 
 namespace dieptxf = drivers::stm32f4::otg_fs_dieptxf;
-constexpr unsigned memory = drivers::stm32f4::otg_fs_fifo_words;
+constexpr unsigned words_of_memory = drivers::stm32f4::otg_fs_fifo_words;
 
 }  // namespace
 
@@ -20,8 +20,9 @@ std::string OtgFsFifos::resize(std::optional<unsigned> transmit_fifo, std::uint3
   const std::uint32_t depth = transmit_fifo ? dieptxf::Depth::of(value) : value;
   if (depth < smallest || depth > largest)
     return fmt::format("a FIFO of {} words, must be {} to {}", depth, smallest, largest);
-  if (start + depth > memory)
-    return fmt::format("a FIFO from word {} to {}; there are {} words", start, start + depth - 1, memory);
+  if (start + depth > words_of_memory)
+    return fmt::format("a FIFO from word {} to {}; there are {} words", start, start + depth - 1,
+                       words_of_memory);
   if (transmit_fifo ? !transmit_[*transmit_fifo].empty() : used_ != 0)
     return "the size of a FIFO changed while something is in it: flush it first";
   (transmit_fifo ? transmit_sizes_[*transmit_fifo] : receive_size_) = value;
@@ -34,7 +35,7 @@ std::string OtgFsFifos::conflict(std::uint32_t used) const {
     if ((used >> fifo & 1U) == 0) continue;
     const std::uint32_t start = dieptxf::Start::of(transmit_sizes_[fifo]);
     const std::uint32_t end = start + dieptxf::Depth::of(transmit_sizes_[fifo]);
-    if (end > memory) return fmt::format("DIEPTXF{} has not been written", fifo);
+    if (end > words_of_memory) return fmt::format("DIEPTXF{} has not been written", fifo);
     if (start < receive_size_) {
       return fmt::format("transmit FIFO {} begins at word {}, inside the receive FIFO of {} words", fifo,
                          start, receive_size_);
