@@ -143,8 +143,7 @@ WrittenNumber written_number(std::string_view given, std::string_view unit, std:
   const std::string_view digits =
       rest.starts_with('-') && rest.size() != text.size() ? "" : rest.substr(rest.starts_with('-'));
   const bool starts_like_a_number = digits.find_first_of("0123456789") == (digits.starts_with('.') ? 1u : 0u);
-  if (!starts_like_a_number)
-    throw ValueError(fmt::format("'{}' is not {}; allowed is {}", text, kind, allowed));
+  if (!starts_like_a_number) throw ValueError(fmt::format("'{}' is not {}", text, kind));
 
   double number = 0;
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);

@@ -36,8 +36,9 @@ base::WrittenNumber parse_number(const Parameter& parameter, std::string_view te
   const Entry& entry = parameter.definition();
   const std::string allowed = allowed_text(parameter);
   try {
-    return base::written_number(
-        text, entry.unit, entry.values.empty() ? "a number" : fmt::format("one of {}", allowed), allowed);
+    const std::string kind =
+        entry.values.empty() ? fmt::format("a number ({})", allowed) : fmt::format("one of {}", allowed);
+    return base::written_number(text, entry.unit, kind, allowed);
   } catch (const base::ValueError& error) {
     fail(parameter, error.what());
   }

@@ -18,7 +18,8 @@ Validator quantity(const char* unit, double least, double most) {
       base::in_unit(fmt::format("{} .. {}", base::number_text(least), base::number_text(most)), unit);
   const auto convert = [unit = std::string(unit), least, most, allowed](std::string& text) -> std::string {
     try {
-      const base::WrittenNumber number = base::written_number(text, unit, "a number", allowed);
+      const base::WrittenNumber number =
+          base::written_number(text, unit, fmt::format("a number ({})", allowed), allowed);
       if (number.value < least || number.value > most)
         return fmt::format("{} not in range {}", number.as_given, allowed);
       text = fmt::format("{}", number.value);

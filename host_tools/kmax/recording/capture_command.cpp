@@ -160,7 +160,8 @@ double level_of(const std::string& text, CaptureTrigger trigger) {
   const char* const unit = trigger == CaptureTrigger::force ? "N" : "m/s";
   constexpr double most = 1e6;
   const std::string allowed = fmt::format("0 .. {} {}", base::number_text(most), unit);
-  const base::WrittenNumber number = base::written_number(text, unit, "a number", allowed);
+  const base::WrittenNumber number =
+      base::written_number(text, unit, fmt::format("a number ({})", allowed), allowed);
   if (number.value < 0.0 || number.value > most)
     throw UsageError(fmt::format("--level: {} is not in range {}", number.as_given, allowed));
   return number.value;

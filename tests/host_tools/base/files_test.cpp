@@ -8,6 +8,7 @@
 #include <csignal>
 #include <stdexcept>
 
+#include "host_tools/base/errors.hpp"
 #include "host_tools/base/files.hpp"
 
 namespace kmax::base::files_test {

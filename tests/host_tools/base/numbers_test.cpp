@@ -124,7 +124,7 @@ TEST(WrittenNumber, AnythingElseIsRefused) {
         [&] { written_number(text, unit, "a number", "0 .. 1 kg"); });
   };
   for (const char* text : {"", "heavy", "nan", "inf", "-inf", "+-1", "--1", "e5"})
-    EXPECT_EQ(refusal(text, "kg"), fmt::format("'{}' is not a number; allowed is 0 .. 1 kg", text));
+    EXPECT_EQ(refusal(text, "kg"), fmt::format("'{}' is not a number", text));
   EXPECT_EQ(refusal("1e400", "kg"), "1e400 is not a number this program can hold; allowed is 0 .. 1 kg");
   EXPECT_EQ(refusal("5 N", "kg"),
             "'5 N': 'N' is not one of its units kg, g, mg; without a unit the number is in kg");

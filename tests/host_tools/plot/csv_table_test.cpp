@@ -94,7 +94,8 @@ TEST(CsvTable, NumbersToDrawWithAreNumbersOrGaps) {
   const auto numbers = [](const std::string& text) {
     return thrown_message<CsvError>([&] { read(text).numbers("b"); });
   };
-  EXPECT_EQ(numbers("a,b\n1,\n2,nan\nx,3\n"), "");
+  const CsvTable gaps = read("a,b\n1,\n2,nan\nx,3\n");
+  EXPECT_EQ(gaps.numbers("b").back(), 3);
   EXPECT_CONTAINS(numbers("a,b\n1,2\n2,abc\n3,4\n"),
                   "t.csv:3: b is 'abc'; a number, nothing, or nan is needed");
   EXPECT_CONTAINS(numbers("a,b\n1,1e400\n"), "t.csv:2: b is '1e400'");
