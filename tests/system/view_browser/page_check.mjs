@@ -182,7 +182,7 @@ const steps = {
     // The simulated person may move the handle meanwhile, which is found.
     assert.match(await page.locator("#result").textContent(), /(✓ Self-test passed|✗ Self-test did not pass).*✓ link.*50 exchanges/);
     assert.equal(await page.locator("#result .finding").count(), 9);
-    assert.equal(armed(), false);
+    await until("the axis is not armed", () => !armed());
   },
   async "contact: its prompts are huge, Enter answers; the other page sees it and cannot answer"() {
     await hold("contact");
@@ -203,7 +203,7 @@ const steps = {
   async "a procedure is cancelled, and one under way is stopped by the space bar"() {
     await page.click("#cancel");
     await eventually(page, () => document.getElementById("result").textContent.includes("was cancelled"));
-    assert.equal(armed(), false);
+    await until("the axis is not armed", () => !armed());
     await hold("contact");
     await page.waitForSelector("#answer:not([hidden])");
     await page.click("#answer");
