@@ -7,7 +7,7 @@ namespace kmax::base {
 
 /// A name's axis and what is left of it: "axis1" and "device.mass" of "axis1.device.mass".
 struct AxisName {
-  std::string_view axis;  ///< "axis" and digits; empty if the name begins otherwise
+  std::string_view axis;  ///< "axis" and a number without leading zeros; empty if the name begins otherwise
   std::string_view rest;
   std::string_view digits;  ///< of the axis
 };
@@ -16,8 +16,8 @@ constexpr AxisName split_axis(std::string_view name) {
   const std::size_t dot = name.find('.');
   if (dot == std::string_view::npos || !name.starts_with(word)) return {{}, name, {}};
   const std::string_view digits = name.substr(word.size(), dot - word.size());
-  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos)
-    return {{}, name, {}};
+  const bool number = !digits.empty() && digits.find_first_not_of("0123456789") == std::string_view::npos;
+  if (!number || (digits.size() > 1 && digits.front() == '0')) return {{}, name, {}};
   return {name.substr(0, dot), name.substr(dot + 1), digits};
 }
 

@@ -47,6 +47,14 @@ std::runtime_error cannot_write(const std::string& path) {
       fmt::format("{}: cannot be written; does the folder exist, and may you write to it?", path));
 }
 
+void make_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error || !std::filesystem::is_directory(path, error))
+    throw std::runtime_error(fmt::format("{}: no folder, and none can be made: {}", path.string(),
+                                         error ? error.message() : "something else has this name"));
+}
+
 void check_writable(const std::string& path) {
   struct stat there {};
   if (::stat(path.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) {

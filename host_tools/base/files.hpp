@@ -15,6 +15,10 @@ std::runtime_error cannot_write(const std::string& path);
 /// pipe: its reader would take the closing for the end.
 void check_writable(const std::string& path);
 
+/// A folder to write into, with those above it, if it is not there yet. Throws a std::runtime_error that says
+/// what stands in its way.
+void make_folder(const std::filesystem::path& path);
+
 /// A file that a command line names, and by which option.
 struct NamedFile {
   std::string_view option;

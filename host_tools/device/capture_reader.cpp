@@ -61,6 +61,10 @@ void check(const CaptureSettings& settings) {
   if (settings.channels.empty() || settings.channels.size() > firmware::capture_channels_max)
     throw base::ValueError(fmt::format("{} channels are to be captured; it can be 1 to {}",
                                        settings.channels.size(), firmware::capture_channels_max));
+  for (auto one = settings.channels.begin(); one != settings.channels.end(); ++one) {
+    if (std::find(settings.channels.begin(), one, *one) != one)
+      throw base::ValueError(fmt::format("the channel {} is named twice; once is enough", *one));
+  }
   if (settings.samples > samples_that_fit(settings))
     throw base::ValueError(fmt::format(
         "{} samples of {} channels do not fit into the device's {} values; at most {} do", settings.samples,

@@ -67,9 +67,11 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error,
     return misplaced;
   const auto names = command_names(app);
   const std::string word = word_for_command(arguments);
-  if (word.empty())
+  if (word.empty()) {
+    if (const std::string unknown = unknown_option_text(app, arguments); !unknown.empty()) return unknown;
     return fmt::format("a command is missing; commands are {}; 'kmax --help' explains them",
                        fmt::join(names, ", "));
+  }
   if (std::find(names.begin(), names.end(), word) == names.end()) {
     const std::string meant = base::did_you_mean(word, names);
     return fmt::format("there is no command '{}'{}", word,

@@ -65,9 +65,20 @@ void add_all_commands(CLI::App& app, Context& context) {
   }
 }
 
+CLI::Validator plain_number() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+        const bool plain = digits && (text.size() == 1 || text.front() != '0');
+        return plain ? std::string() : fmt::format("'{}' is not a plain number such as 0 or 12", text);
+      },
+      "");
+}
+
 CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* help) {
   return command.add_option("--axis", context.axis_option, help)
       ->type_name("N")
+      ->check(plain_number())
       ->check(CLI::Range(0, static_cast<int>(firmware::axis_count) - 1));
 }
 
@@ -85,7 +96,13 @@ void add_device_option(CLI::App& command, Context& context) {
       .add_option("--device", context.device_option,
                   "sim, usb[:SERIAL], serial:PATH[?unit=1&baud=115200] or can:IFACE[?node=1]; else "
                   "KMAX_DEVICE, the settings file, or sim")
-      ->type_name("ADDRESS");
+      ->type_name("ADDRESS")
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            return text.empty() ? "the address is empty; name a device, or leave --device out"
+                                : std::string();
+          },
+          ""));
 }
 
 CLI::App* add_command(CLI::App& app, Context& context, const CommandText& text, Takes takes) {

@@ -44,6 +44,9 @@ CLI::Option* add_axis_option(CLI::App& command, Context& context, const char* he
 /// --device.
 void add_device_option(CLI::App& command, Context& context);
 
+/// A whole number in digits alone. The library that parses options reads 010 as 8, and 0x1 and +1 as 1.
+CLI::Validator plain_number();
+
 /// A finite number from `least` to `most`: CLI::Range alone lets a NaN pass.
 CLI::Validator within(double least, double most);
 

@@ -94,6 +94,17 @@ std::string misplaced_option_text(const App& app, const std::vector<std::string>
   return {};
 }
 
+std::string unknown_option_text(const App& app, const std::vector<std::string>& arguments) {
+  const std::vector<std::string> known = options_of(app);
+  for (const std::string& argument : arguments) {
+    const std::string name = option_name(argument);
+    if (!is_long_option(argument) || contains(known, name)) continue;
+    return fmt::format("there is no option '{}' before a command{}; 'kmax --help' names those there are",
+                       name, base::did_you_mean(name, known));
+  }
+  return {};
+}
+
 std::string usage_suggestion(const App& app, const CLI::ParseError& error,
                              const std::vector<std::string>& arguments) {
   if (const std::string choice = choice_suggestion(error.what()); !choice.empty()) return choice;

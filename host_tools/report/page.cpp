@@ -78,7 +78,7 @@ std::string csv(const Table& table) {
 std::vector<std::filesystem::path> write_page(const Page& page, const std::filesystem::path& folder,
                                               const std::string& name) {
   const std::string as_markdown = markdown(page), as_html = html(page);
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   const std::vector<std::filesystem::path> files = {folder / (name + ".md"), folder / (name + ".html")};
   base::write_file(files[0], as_markdown);
   base::write_file(files[1], as_html);

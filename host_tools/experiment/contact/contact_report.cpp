@@ -66,7 +66,7 @@ std::string base_name(const ContactCondition& condition) {
 std::vector<std::filesystem::path> write_contact(const ContactResult& result,
                                                  const std::filesystem::path& folder,
                                                  const std::string& picture_ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   const std::filesystem::path csv = folder / (base_name(result.condition) + ".csv");
   std::string table = "time_s,position_m,force_n,magnetic_coefficient_n\n";
   plot::Series distance{"", {}, {}, true}, force{"", {}, {}, true}, coefficient{"", {}, {}, true};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/base/files.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
@@ -202,7 +203,7 @@ std::vector<std::string> deviation_words(const DeviationStudy& study) {
 std::vector<std::filesystem::path> write_deviation(const DeviationStudy& study, const Provenance& provenance,
                                                    const std::filesystem::path& folder,
                                                    const std::string& ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   std::vector<std::filesystem::path> files = {folder / "deviation.csv", folder / "deviation_fit.csv"};
   report::write_csv(deviation_table(study), files[0]);
   report::write_csv(deviation_fit_table(study), files[1]);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/base/files.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
 #include "host_tools/report/page.hpp"
@@ -235,7 +236,7 @@ plot::Series trace(const std::string& label, const std::vector<RigSample>& sampl
 std::vector<std::filesystem::path> write_jitter(const JitterStudy& study, const Provenance& provenance,
                                                 const std::filesystem::path& folder,
                                                 const std::string& ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   std::vector<std::filesystem::path> files = {folder / "jitter.csv"};
   report::write_csv(jitter_table(study), files.front());
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host_tools/base/files.hpp"
 #include "host_tools/experiment/contact/contact_experiment.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/plot/figure.hpp"
@@ -113,7 +114,7 @@ std::vector<std::filesystem::path> write_device_stiffness(
     const std::vector<DeviceStiffnessResult>& results, const DeviceStiffnessSettings& settings,
     const TouchLimits& limits, const std::string& device, const Provenance& provenance,
     const std::filesystem::path& folder, const std::string& picture_ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   const std::filesystem::path picture = folder / ("max_stiffness" + picture_ending);
   const std::filesystem::path csv = folder / "max_stiffness.csv",
                               touches = folder / "max_stiffness_touches.csv";

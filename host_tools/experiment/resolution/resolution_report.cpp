@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "control/resolution_criterion.hpp"
+#include "host_tools/base/files.hpp"
 #include "host_tools/experiment/report_words.hpp"
 #include "host_tools/experiment/simulated_touch.hpp"
 #include "host_tools/plot/figure.hpp"
@@ -226,7 +227,7 @@ std::vector<std::filesystem::path> write_resolution(const ResolutionStudy& study
                                                     const Provenance& provenance,
                                                     const std::filesystem::path& folder,
                                                     const std::string& ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   std::vector<std::filesystem::path> files = {folder / "resolution.csv", folder / "resolution_claims.csv"};
   report::write_csv(resolution_table(study), files[0]);
   report::write_csv(resolution_claims_table(study), files[1]);

@@ -178,7 +178,7 @@ report::Table measure_table(const WallTestResult& result) {
 std::vector<std::filesystem::path> write_wall_test(const WallTestResult& result, const Provenance& provenance,
                                                    const std::filesystem::path& folder,
                                                    const std::string& picture_ending) {
-  std::filesystem::create_directories(folder);
+  base::make_folder(folder);
   const std::filesystem::path picture = folder / ("wall_test" + picture_ending);
   std::vector<std::string> words = wall_test_words(result);
   if (result.origin != report::Origin::measured)

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <limits>
 
 #include "firmware/drive/fault.hpp"
 #include "host_tools/base/numbers.hpp"
@@ -25,7 +26,9 @@ struct FaultsOptions {
   std::optional<std::uint32_t> number;
   bool clear = false;
   void declare(CLI::App& command) {
-    auto* one = command.add_option("number", number, "Show all of the entry with this number");
+    auto* one = command.add_option("number", number, "Show all of the entry with this number")
+                    ->check(plain_number())
+                    ->check(CLI::Range(std::uint32_t{0}, std::numeric_limits<std::uint32_t>::max()));
     command.add_flag("--clear", clear, "Erase the log; refused while an axis is armed")->excludes(one);
   }
 };

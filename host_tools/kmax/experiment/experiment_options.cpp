@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 
+#include "host_tools/base/files.hpp"
 #include "host_tools/base/print.hpp"
 #include "host_tools/device/sim/sim_link.hpp"
 #include "host_tools/experiment/people/subject_set.hpp"
@@ -61,7 +62,7 @@ experiment::Provenance provenance_of(const ExperimentFiles& files) {
 }
 
 void make_folder(const ExperimentFiles& files) {
-  if (!files.folder.empty()) std::filesystem::create_directories(files.folder);
+  if (!files.folder.empty()) base::make_folder(files.folder);
 }
 
 Json names_json(const std::vector<std::filesystem::path>& written) {

@@ -132,6 +132,23 @@ TEST_F(Files, APipeWithoutAPathIsWritten) {
   close(ends[1]);
 }
 
+TEST_F(Files, AFolderIsMadeOrItIsSaidWhatStandsInItsWay) {
+  make_folder(folder / "a/b");
+  make_folder(folder / "a/b");
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b"));
+  write_file(folder / "file", "kept");
+  for (const auto& refused : {folder / "file", folder / "file/below", std::filesystem::path()}) {
+    try {
+      make_folder(refused);
+      ADD_FAILURE() << refused;
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(std::string(error.what()).find(refused.string() + ": no folder, and none can be made: "), 0u)
+          << error.what();
+    }
+  }
+  EXPECT_EQ(text_of<std::runtime_error>(folder / "file", ""), "kept");
+}
+
 TEST_F(Files, ThatAreOneUnderTwoNamesAreRefused) {
   const auto refused = [&](const std::string& one, const std::string& other) {
     try {

@@ -259,6 +259,7 @@ TEST_F(CaptureReaderTest, SettingsThatCannotBeMeantAreRefusedBeforeAnythingIsSen
   };
   refused([](auto& s) { s.channels = {}; }, "0 channels");
   refused([](auto& s) { s.channels.resize(5, "force"); }, "5 channels");
+  refused([](auto& s) { s.channels = {"force", "count", "force"}; }, "force is named twice");
   refused([](auto& s) { s.channels = {"forse"}; }, "did you mean force");
   refused([](auto& s) { s.channels = {"none"}; }, "no channel 'none'");
   refused([](auto& s) { s.samples = 6145; }, "at most 6144");

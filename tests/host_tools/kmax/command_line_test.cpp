@@ -107,6 +107,30 @@ TEST_F(CommandLine, ExitCodesTellWhoseFaultItIs) {
   EXPECT_EQ(kmax({"get", "wall.law"}), base::failed);
 }
 
+/// What a library makes of them is another axis, a device that nobody named, or a text that names no value.
+TEST_F(CommandLine, ArgumentsThatALibraryWouldTakeOrExplainItsOwnWay) {
+  for (const char* axis : {"0x1", "01", "+1", "1.0", "1e0", "", " 1"}) {
+    EXPECT_EQ(kmax({"get", "wall.law", "--axis", axis}), base::wrong_usage) << axis;
+    EXPECT_CONTAINS(said, "is not a plain number");
+  }
+  EXPECT_EQ(kmax({"get", "axis01.wall.law"}), base::wrong_usage);
+  for (const char* command : {"get", "set"}) {
+    EXPECT_EQ(kmax({command, "wall.law", "--device", ""}), base::wrong_usage);
+    EXPECT_CONTAINS(said, "the address is empty");
+  }
+  for (const char* entry : {"-1", "010", "0x10", "1.5", "99999999999"}) {
+    EXPECT_EQ(kmax({"faults", entry}), base::wrong_usage) << entry;
+    EXPECT_CONTAINS(said, entry);
+  }
+  EXPECT_EQ(kmax({"--bogus"}), base::wrong_usage);
+  EXPECT_CONTAINS(said, "there is no option '--bogus' before a command");
+  EXPECT_EQ(kmax({"--versoin"}), base::wrong_usage);
+  EXPECT_CONTAINS(said, "did you mean --version?");
+  EXPECT_EQ(opened, "") << "nothing was asked of a device";
+  EXPECT_EQ(kmax({"capture", "--channels", "force,position,force"}), base::wrong_usage);
+  EXPECT_CONTAINS(said, "the channel force is named twice");
+}
+
 TEST_F(CommandLine, ErrorsAreADocumentToo) {
   for (const std::vector<std::string>& bad :
        std::vector<std::vector<std::string>>{{"get", "wall.stifness", "--json"},
