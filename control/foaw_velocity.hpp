@@ -30,8 +30,8 @@ inline constexpr std::int32_t foaw_window_max = chord_window_max;
 // The paper's best fit checks the least-squares line itself against the band while it widens the window; here
 // both fits take the chord's window. The end fit is the paper's unchanged. For the best fit the choice of the
 // window becomes a search in whole numbers without the sums, and those are needed once instead of for every
-// n: half of the instructions. What it does to the error is in docs/velocity_estimators.md: over the twelve
-// cases there it lies between -8 % and +3 % of what the paper's check gives, equal in seven.
+// n: half of the instructions. What it does to the error is in docs/velocity_estimators.md: over twelve
+// cases it lies between -8 % and +3 % of what the paper's check gives, equal in seven.
 //
 // Decisions are exact, so float, double, x86 and ARM choose the same window (chord_window.hpp). The sums are
 // differences of running sums in 32-bit words, exact modulo 2^32, and the slope is taken relative to that of
@@ -46,7 +46,7 @@ inline constexpr std::int32_t foaw_window_max = chord_window_max;
 //
 // Cost on a Cortex-M4F (GCC 12.2, -O2; executed instructions): the same for every input that holds over 16
 // intervals, less when the window ends earlier; with the count extension, the resampling and the choice of
-// the estimator 223 for the best fit, 220 for the end fit. 109 of these are the search for the window. 552
+// the estimator 231 for the best fit, 237 for the end fit. 109 of these are the search for the window. 552
 // bytes.
 template <typename Scalar>
 class FoawVelocity {
@@ -76,9 +76,10 @@ class FoawVelocity {
     window_ = 1;
   }
 
-  // As if the handle had come to this count at a constant velocity, m/s. A velocity beyond 2^18 steps per
+  // As if the handle had come to this count at a constant velocity, m/s, and its last sample lay `ago` of an
+  // interval back, 0 <= ago < 1. Returns the steps moved since that sample. A velocity beyond 2^18 steps per
   // sample is cut to that: the next sample then restarts the window.
-  void reset(const Coefficients& coefficients, std::int64_t count, Scalar velocity) {
+  std::int32_t reset(const Coefficients& coefficients, std::int64_t count, Scalar velocity, Scalar ago) {
     constexpr auto fastest = static_cast<Scalar>(1 << 18);
     Scalar speed = velocity * coefficients.per_sample;
     if (speed > fastest) speed = fastest;
@@ -88,7 +89,7 @@ class FoawVelocity {
     std::uint32_t sum_so_far = 0;
     std::uint32_t double_sum_so_far = 0;
     for (std::uint32_t i = 0; i < foaw_window_max + 2; ++i) {
-      const auto back = static_cast<std::int32_t>(speed * static_cast<Scalar>(i) + half);
+      const auto back = static_cast<std::int32_t>(speed * (static_cast<Scalar>(i) + ago) + half);
       const std::uint32_t at = 0U - static_cast<std::uint32_t>(back);
       rings_[i] = rings_[i + ring] = at;
       rings_[2 * i + sums] = sum_so_far;
@@ -102,6 +103,7 @@ class FoawVelocity {
     newest_.interval = rings_[0] - rings_[1];
     newest_.steps = static_cast<std::int32_t>(newest_.interval);
     window_ = 1;
+    return static_cast<std::int32_t>(0U - newest_.position);
   }
 
   // What push() leaves for estimate().

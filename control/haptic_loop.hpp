@@ -64,16 +64,17 @@ struct HapticLoopConfig {
 ///
 /// A value that is not finite anywhere gives zero force and `not_finite`; a velocity beyond the limit
 /// gives zero force and `over_speed`; an oscillation, where the action is `trip`, gives zero force and
-/// `unstable`. Faults are reported on every tick until the next haptic sample; to latch them is the axis'
-/// business. While not enabled, everything is still estimated and evaluated, so that arming starts from a
-/// settled estimator, but the force is zero and the soft start is wound back.
+/// `unstable`. Where FOAW takes every second sample its velocity, and with it `over_speed`, may be one sample
+/// late, and a jump counts over both. Faults are reported on every tick until the next haptic sample; to
+/// latch them is the axis' business. While not enabled, everything is still estimated and evaluated, so that
+/// arming starts from a settled estimator, but the force is zero and the soft start is wound back.
 ///
 /// The detector sees the encoder's own counts from where the loop was enabled, since a coarser resolution is
 /// the wall's and not the handle's motion, and a wall that is moved moves no handle; and the force after all
-/// limits. It looks at every sample up to 10 kHz; beyond that at every fourth, where no wall makes what a
-/// hand holds oscillate so fast that it would miss a turn. It looks on in tick() only, while enabled. What
-/// has been softened stays so until the loop is not enabled, or reset; alarms are counted until they are
-/// forgotten.
+/// limits. It looks at every sample up to 10 kHz; beyond that at every fourth, which is one that FOAW leaves
+/// out: no wall makes what a hand holds oscillate so fast that it would miss a turn. It looks on in tick()
+/// only, while enabled. What has been softened stays so until the loop is not enabled, or reset; alarms are
+/// counted until they are forgotten.
 ///
 /// No heap, no libm, no virtual call, no loop beyond the velocity estimator's window.
 template <typename Scalar>
@@ -96,7 +97,7 @@ class HapticLoop {
     typename Interference<Scalar>::Coefficients interference{};
     typename ForceLimiter<Scalar>::Coefficients force{};
     InstabilityAction instability_action = InstabilityAction::off;
-    std::uint32_t watch_mask = 0;  ///< the detector looks at samples whose number has none of these bits
+    std::uint32_t watch_mask = 0;  ///< the detector looks at samples whose number has all of these bits
     typename InstabilityDetector<Scalar>::Coefficients instability{};
     typename WallSoftening<Scalar>::Coefficients softening{};
   };
@@ -222,8 +223,8 @@ class HapticLoop {
   }
 
  private:
-  /// s; where samples come faster, the detector looks at every fourth.
-  static constexpr Scalar shortest_look = Scalar(0.0001);
+  /// s; where samples come faster, the detector looks at every fourth, one that FOAW leaves out.
+  static constexpr auto shortest_look = static_cast<Scalar>(foaw_shortest_period);
 
   struct Motion {
     Scalar velocity{};          ///< m/s along +x
@@ -257,7 +258,7 @@ class HapticLoop {
     held_.new_sample = true;
     held_.fault = HapticFault::none;
     held_.position = sample.count;
-    held_.velocity = velocity_.update(c.velocity, sample);
+    held_.velocity = velocity_.update(c.velocity, sample, samples_);
     held_.outside_distance = outside_distance(c, sample.count);
     return {held_.velocity, held_.outside_distance};
   }
@@ -313,7 +314,7 @@ class HapticLoop {
     held_.fault = finite ? HapticFault::over_speed : HapticFault::not_finite;
   }
 
-  bool watch_is_due(const Coefficients& c) const { return (samples_ & c.watch_mask) == 0; }
+  bool watch_is_due(const Coefficients& c) const { return (c.watch_mask & ~samples_) == 0; }
 
   /// Whether the wall oscillates under the hand, with what is to be done about it. A function of its own: it
   /// would take registers from the velocity estimator.
@@ -390,7 +391,7 @@ typename HapticLoop<Scalar>::Coefficients HapticLoop<Scalar>::prepare(const Hapt
   c.force = ForceLimiter<Scalar>::prepare(config.force, period);
   c.instability_action = config.instability_action;
   auto instability = config.instability;
-  // Four is a power of two: one comparison of bits.
+  // Four is a power of two: one comparison of bits. The last of four is odd, so FOAW leaves it out.
   constexpr std::uint32_t samples_a_look = 4;
   const bool at_each = period >= shortest_look;
   c.watch_mask = at_each ? 0 : samples_a_look - 1;

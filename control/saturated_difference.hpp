@@ -35,6 +35,18 @@ inline std::int32_t count_difference(std::int64_t to, std::int64_t from) {
   return difference < 0 ? std::numeric_limits<std::int32_t>::min() : std::numeric_limits<std::int32_t>::max();
 }
 
+// a + b, limited to the range of int32: QADD.
+inline std::int32_t saturated_sum(std::int32_t a, std::int32_t b) {
+#if defined(__ARM_FEATURE_DSP) && defined(__ARM_FEATURE_SAT)
+  return __qadd(a, b);
+#else
+  const std::int64_t sum = std::int64_t{a} + b;
+  const auto narrow = static_cast<std::int32_t>(sum);
+  if (narrow == sum) return narrow;
+  return sum < 0 ? std::numeric_limits<std::int32_t>::min() : std::numeric_limits<std::int32_t>::max();
+#endif
+}
+
 // to - from, limited to [-8, 7]: QSUB and SSAT.
 inline std::int32_t difference_to_4_bits(std::int32_t to, std::int32_t from) {
 #if defined(__ARM_FEATURE_DSP) && defined(__ARM_FEATURE_SAT)

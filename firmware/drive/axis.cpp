@@ -108,7 +108,8 @@ void Axis::take_change(std::uint32_t state) {
 
 /// As after power-up, for the estimators and for what the main loop has heard.
 void Axis::start_afresh() {
-  // In step with the ticks, so that the detector of a fast loop looks in every fourth of them.
+  // In step with the ticks: of a loop that computes in each of them FOAW takes the even ones, and what is
+  // slow lies in odd ones.
   const std::uint32_t counted = loop_.samples();
   loop_.reset(tick_ - 1);
   armed_from_ += loop_.samples() - counted;

@@ -169,8 +169,9 @@ class MotorControl {
   static void take(const FieldOriented::Output& made, Output& out);
   [[gnu::noinline, gnu::cold]] void report_fault(control::PhaseCondition condition, const Coefficients& c,
                                                  const Measured& measured, Output& out);
-  /// Ticks 2 and 7 of eight, in which no other watch looks. Not a whole number of quarters of eight apart: of
-  /// a current that alternates in step with the looks, both would find the zero on its way to the other side.
+  /// Ticks 2 and 7 of eight, in which there is neither a report nor a look at the motion. Not a whole number
+  /// of quarters of eight apart: of a current that alternates in step with the looks, both would find the
+  /// zero on its way to the other side.
   static constexpr bool looks_at_phases(std::uint32_t tick) { return tick % 8 == 2 || tick % 8 == 7; }
   /// Not always the same tick of eight: a current that alternates from tick to tick would be seen at one of
   /// its values alone. Over 64 ticks each of the eight has its turn.

@@ -106,7 +106,8 @@ inline constexpr std::array axis_settings = std::to_array<Entry>({
            "with the best fit or the end fit, a tracking loop, or the time between edges of the position.")
         .disarmed_only(),
     whole("velocity.window", group::velocity, 2, unsigned8, "samples", 1, 16, 16,
-          "Widest window of foaw and foaw_end_fit.")
+          "Widest window of foaw and foaw_end_fit, in samples that they take: each up to 10 kHz, every "
+          "second one beyond.")
         .disarmed_only(),
     real("velocity.bandwidth", group::velocity, 3, "Hz", 0.1, 5000, 100,
          "Bandwidth of low_pass and tracking.")

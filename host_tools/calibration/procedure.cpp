@@ -296,8 +296,8 @@ void run_steps(Calibration& run, const board::BoardDescription& electronics, con
   run.known = knowledge_of(run.bench, run.settings, electronics);
   // What is to be identified must not be corrected meanwhile.
   run.bench.set_temporary({"compensation.dead_time=0", "compensation.limit=0"});
-  // Under an encoder that has died its velocity is 0 after 16 samples; the edge period's falls as one over
-  // the time.
+  // Under an encoder that has died its velocity is 0 after its window, 33 samples at 20 kHz; the edge
+  // period's falls as one over the time.
   run.bench.set_temporary({"velocity.estimator=foaw"});
   std::chrono::seconds to_go{};
   for (const Step& step : calibration_steps()) {

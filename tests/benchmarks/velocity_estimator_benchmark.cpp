@@ -24,7 +24,8 @@ void print(const std::vector<Row>& rows) {
   std::printf(
       "Velocity estimators, float, one VelocityEstimator::update per sample; best of 9 repetitions on this "
       "computer.\n"
-      "Settings: FOAW window %d intervals, band +-1 quantum; low pass and tracking %g Hz.\n"
+      "Settings: FOAW window %d intervals, band +-1 quantum, beyond 10 kHz of every second sample;\n"
+      "low pass and tracking %g Hz.\n"
       "Signals, 4 s each, floor-quantized; the error is against the analytic velocity at the sampling "
       "instant,\n"
       "so it contains both the noise and the delay; the first 0.2 s are left out:\n"

@@ -106,7 +106,8 @@ inline Row measure(const Estimator& estimator, const Signal& signal, double quan
     for (std::size_t pass = 0; pass < passes; ++pass) {
       VelocityEstimator<float> velocity;
       velocity.reset(counts[0]);
-      for (std::size_t k = 0; k < samples; ++k) estimates[k] = velocity.update(coefficients, counts[k]);
+      for (std::size_t k = 0; k < samples; ++k)
+        estimates[k] = velocity.update(coefficients, counts[k], static_cast<std::uint32_t>(k));
       keep(estimates.back());
     }
   });

@@ -217,7 +217,7 @@ TEST(FoawVelocity, StartsOnAKnownVelocityWithAFullWindow) {
   const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);
   for (const double steps_per_sample : {0.0, 0.3, -0.3, 7.25, -1234.5, 200'000.0}) {
     FoawVelocity<double> velocity;
-    velocity.reset(coefficients, 0, steps_per_sample * coefficients.scale);
+    velocity.reset(coefficients, 0, steps_per_sample * coefficients.scale, 0.0);
     const auto count = static_cast<std::int64_t>(std::floor(steps_per_sample + 0.5));
     const double estimate = velocity.update(coefficients, count, FoawFit::end);
     EXPECT_NEAR(estimate, steps_per_sample * coefficients.scale, coefficients.scale / 8.0);
@@ -230,7 +230,7 @@ TEST(FoawVelocity, AStartThatIsTooFastIsCutInBothDirections) {
   const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);
   for (const double side : {1.0, -1.0}) {
     FoawVelocity<double> velocity;
-    velocity.reset(coefficients, 0, side * 1e9 * coefficients.scale);
+    velocity.reset(coefficients, 0, side * 1e9 * coefficients.scale, 0.0);
     EXPECT_NEAR(velocity.update(coefficients, static_cast<std::int64_t>(side * fastest), FoawFit::end),
                 side * fastest * coefficients.scale, coefficients.scale);
   }
@@ -241,7 +241,7 @@ TEST(FoawVelocity, AStartOnAKnownVelocityLeavesTheSumsOfThatRamp) {
   const auto coefficients = FoawVelocity<double>::prepare(16, 5e-5, 1e-6, 1);
   for (const auto fit : {FoawFit::end, FoawFit::best}) {
     FoawVelocity<double> started, ramped;
-    started.reset(coefficients, 0, 8 * coefficients.scale);
+    started.reset(coefficients, 0, 8 * coefficients.scale, 0.0);
     ramped.reset(-8 * 40);
     for (int i = -39; i <= 0; ++i) (void)ramped.update(coefficients, 8 * i, fit);
     for (int i = 1; i <= 16; ++i) {

@@ -228,23 +228,71 @@ TEST(HapticLoop, CoefficientsThatAreNotFiniteGiveZeroForceAndAFaultNeverANaN) {
   }
 }
 
-// A count that jumps after a long rest, as of a damaged encoder: 64 counts in a tick are 1.28 m/s.
+// A count that jumps after a long rest, as of a damaged encoder: 64 counts in a tick are 1.28 m/s, and so are
+// 128 in the two that FOAW takes as one; it may find them a tick later.
 TEST(HapticLoop, AJumpAfterARestTripsWithEveryEstimatorThatLooksAtSingleSamples) {
   using enum VelocityEstimatorKind;
   for (const auto kind : {difference, foaw, foaw_end_fit, edge_period}) {
-    for (const int rest : {2, 30, 10'000}) {
-      for (const int jump : {64, -64, 100'000}) {
+    const bool of_two = kind == foaw || kind == foaw_end_fit;
+    for (const int rest : {2, 3, 30, 31, 10'000}) {
+      for (const int jump : {of_two ? 128 : 64, of_two ? -128 : -64, 100'000}) {
         auto config = plain_wall<float>();
         config.velocity.kind = kind;
         config.velocity_limit = 1.0f;
         Loop<float> loop(config);
         loop.at(1000);
         for (int n = 0; n < rest; ++n) ASSERT_EQ(loop.at(1001).fault, HapticFault::none);
-        const auto& out = loop.at(1001 + jump);
+        auto out = loop.at(1001 + jump);
+        if (of_two && out.fault == HapticFault::none) out = loop.at(1001 + jump);
         EXPECT_EQ(out.fault, HapticFault::over_speed) << static_cast<int>(kind) << " after " << rest;
         EXPECT_EQ(out.force, 0.0f);
       }
     }
+  }
+}
+
+// At 20 kHz FOAW takes a jump of 64 counts in a tick as 0.64 m/s, for two ticks.
+TEST(HapticLoop, AJumpThatIsWithinTheLimitOverTwoSamplesDoesNotTripWithFoaw) {
+  for (const int rest : {2, 3}) {
+    auto config = plain_wall<float>();
+    config.velocity.kind = VelocityEstimatorKind::foaw;
+    config.velocity_limit = 1.0f;
+    Loop<float> loop(config);
+    loop.at(1000);
+    for (int n = 0; n < rest; ++n) loop.at(1001);
+    for (int n = 0; n < 4; ++n) EXPECT_EQ(loop.at(1065).fault, HapticFault::none) << rest;
+  }
+}
+
+// In which samples what is slow is done. The tick's budget is counted with it.
+TEST(HapticLoop, BeyondTenKilohertzFoawTakesTheEvenSamplesAndTheDetectorLooksInOddOnes) {
+  auto config = plain_wall<float>();
+  for (const std::uint32_t divider : {1u, 2u, 40u}) {
+    config.divider = divider;
+    const auto c = HapticLoop<float>::prepare(config, 0);
+    EXPECT_EQ(c.watch_mask, divider == 1 ? 3u : 0u);
+    EXPECT_EQ(c.velocity.foaw_leaves_out, divider == 1 ? 1 : 0);
+  }
+  config.divider = 1;
+  config.wall_position = 1.0;  // the handle stands in it from the start
+  config.instability_action = InstabilityAction::warn;
+  const auto c = HapticLoop<float>::prepare(config, 0);
+  for (const std::uint32_t first : {7u, 8u, 9u, 10u, 0xFFFFFFFEu}) {
+    HapticLoop<float> loop;
+    loop.reset(first - 1);
+    float before = 0.0f;
+    std::uint32_t changes = 0;
+    for (std::uint32_t n = 0; n < 400; ++n) {
+      const std::uint32_t number = first + n;
+      const float velocity = loop.tick(c, 10 * static_cast<std::int64_t>(n) * n, true).velocity;
+      ASSERT_EQ(loop.samples(), number);
+      if (velocity != before) {
+        ASSERT_EQ(number % 2, 0u);
+        ++changes;
+      }
+      before = velocity;
+    }
+    EXPECT_GE(changes, 190u);
   }
 }
 

@@ -23,7 +23,7 @@ inline const std::array<VelocityCandidate, 6> velocity_candidates{{
     {"edge period, 16", "alone: edge period, 16 samples "},
     {"edge period, 8", "alone: edge period, 8 samples "},
 }};
-constexpr std::size_t edge_period = 4;  ///< of 16 samples
+constexpr std::size_t foaw_of_every_second = 1, edge_period = 4;  ///< of 16 intervals, of 16 samples
 template <typename Number>
 using ByCandidate = std::array<Number, velocity_candidates.size()>;
 

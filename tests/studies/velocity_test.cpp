@@ -25,6 +25,16 @@ TEST(VelocityStudy, TheEdgePeriodIsRightWhereFoawIsNoisyAndAsGoodInImpacts) {
   }
 }
 
+// Why the firmware's FOAW takes every second sample beyond 10 kHz, and each up to there.
+TEST(VelocityStudy, FoawOfEverySecondSampleIsBetterAt20KilohertzAndNotBelow) {
+  const auto cases = measure_velocity_errors();
+  const auto at = [&cases](double rate) { return against_foaw(at_rate(cases, rate))[foaw_of_every_second]; };
+  EXPECT_LT(at(20e3).mean, 0.75);
+  EXPECT_LT(at(20e3).largest, 1.3);
+  EXPECT_GT(at(2e3).largest, 2.0);
+  EXPECT_GT(at(500.0).mean, 1.2);
+}
+
 TEST(VelocityStudy, FoawsWindowLeapsSoNoSearchCanGoOnFromTheLast) {
   EXPECT_GT(share_of_leaps(), 0.001);
 }

@@ -155,7 +155,6 @@ BudgetReport measure_budget(const std::string& elf_path, simulation::Scene scene
     add("wall.law", std::string("adaptive"));
     add("velocity.estimator", std::string("foaw"));
     add("velocity.window", std::int64_t{16});
-    add("haptic.rate", 20000.0);
   }
   const base::ElfImage image = base::ElfImage::load(elf_path);
   SceneWorld world(scene);

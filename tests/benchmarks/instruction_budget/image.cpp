@@ -297,11 +297,11 @@ int main() {
   measure_wall("adaptive wall law that grows           ", kmax::control::WallKind::adaptive, 300.0F, 145);
   measure_wall("magnetic wall law                      ", kmax::control::WallKind::magnetic, 0.0F, 0);
   measure_instability();
-  measure_position("32-bit position, FOAW best fit         ", &position32_step, Kind::foaw, 225);
-  measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 225);
-  measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 230);
+  measure_position("32-bit position, FOAW best fit         ", &position32_step, Kind::foaw, 235);
+  measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 235);
+  measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 240);
   measure_position("32-bit position, tracking              ", &position32_step, Kind::tracking, 0);
-  measure_position("32-bit position, edge period           ", &position32_step, Kind::edge_period, 195);
+  measure_position("32-bit position, edge period           ", &position32_step, Kind::edge_period, 200);
   measure_position("32-bit position without velocity       ", &resample_step, Kind::foaw, 0);
   print("Velocity estimators alone, as docs/velocity_estimators.md compares them: mean and worst\n");
   measure_candidate<kmax::studies::HeldFoaw<1>>("alone: FOAW                            ", 0);

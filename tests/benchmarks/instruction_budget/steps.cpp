@@ -20,14 +20,14 @@ void position16_step(Position<std::uint16_t>& position, const PositionCoefficien
   const auto sample =
       position.resampler.sample(c.resampler, position.extender.update(static_cast<std::uint16_t>(raw)));
   out.count = sample.count;
-  out.velocity = position.velocity.update(c.velocity, sample);
+  out.velocity = position.velocity.update(c.velocity, sample, ++position.samples);
 }
 
 void position32_step(Position<std::uint32_t>& position, const PositionCoefficients& c, PositionOutput& out,
                      std::uint32_t raw) {
   const auto sample = position.resampler.sample(c.resampler, position.extender.update(raw));
   out.count = sample.count;
-  out.velocity = position.velocity.update(c.velocity, sample);
+  out.velocity = position.velocity.update(c.velocity, sample, ++position.samples);
 }
 
 void resample_step(Position<std::uint32_t>& position, const PositionCoefficients& c, PositionOutput& out,

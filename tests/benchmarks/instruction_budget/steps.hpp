@@ -38,6 +38,7 @@ struct Position {
   control::CountExtender<Counter> extender;
   control::Resampler resampler;
   Velocity velocity;
+  std::uint32_t samples = 0;
 };
 struct PositionCoefficients {
   control::Resampler::Coefficients resampler;

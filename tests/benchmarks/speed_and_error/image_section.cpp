@@ -53,10 +53,11 @@ report::Section image_section(const std::filesystem::path& budget) {
                                          found, haptic_steps.size()));
   const double native = native_haptic_tick();
   section.paragraphs = {
-      "Compared: the same haptic loop (adaptive wall, FOAW with 16 intervals, every tick at 20 kHz) compiled "
-      "for this computer and in the flashed image on the virtual board, which counts the image's "
-      "instructions and models the cycles of each (host_tools/virtual_board/cortex_m/instruction.hpp; wait "
-      "states of the flash are left out). The input differs, the code does not.",
+      "Compared: the same haptic loop (adaptive wall, FOAW with 16 intervals of two ticks, every tick at "
+      "20 kHz) compiled for this computer and in the flashed image on the virtual board, which counts the "
+      "image's instructions and models the cycles of each "
+      "(host_tools/virtual_board/cortex_m/instruction.hpp; wait states of the flash are left out). The "
+      "input differs, the code does not.",
       "The values are equal bit for bit: tests/image/parity/parity_test.cpp repeats every call of the axis' "
       "tick in the image on this side with the very bytes that it was given, and allows no difference. So "
       "there is no error to weigh against the speed here. What the other steps of the image's tick cost "

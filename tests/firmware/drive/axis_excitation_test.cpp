@@ -391,7 +391,11 @@ TEST_F(AxisExcitationTest, AMotionAgainstTheForceMadeTripsInHapticModeIfItIsWatc
     }
     const bool trips = watched && against && mode == DriveMode::haptic;
     EXPECT_EQ(found, trips ? Fault::spin_out : Fault::none);
-    EXPECT_NEAR(fresh.ISR_report().fault_value, trips ? 0.02f : 0.0f, 1.5e-3f) << "J";
+    // Found by a look: there may be more of it than is allowed, by what comes up between two. The handle
+    // gains what 6 N give it and should have lost as much.
+    const auto most_a_look = static_cast<float>((6.0 + 6.0) * std::abs(velocity) * Axis::motion_look * 5e-5);
+    EXPECT_GE(fresh.ISR_report().fault_value, trips ? 0.02f : 0.0f) << "J";
+    EXPECT_LE(fresh.ISR_report().fault_value, trips ? 0.02f + most_a_look : 0.0f) << "J";
   }
 }
 

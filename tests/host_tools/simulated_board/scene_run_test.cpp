@@ -147,8 +147,12 @@ TEST(SceneRun, PersonsPressAgainstWallsThatMotorsMake) {
       }
       ASSERT_GT(held, 1000);
       EXPECT_GT(asked / held, 0.7) << name;
-      // Without noise a steady current may stay half a code off: 10 mA are 0.05 N.
-      EXPECT_NEAR(made / held, asked / held, 0.06) << name;
+      // Without noise a steady current may stay half a code off in each phase that is measured: 10 mA are
+      // 0.05 N, and of two phases of a synchronous motor the sum may count.
+      const std::size_t axis = static_cast<std::size_t>(&samples - result.samples.data());
+      const bool synchronous =
+          std::holds_alternative<simulation::SynchronousMotorConfig>(scene.axes[axis].motor.value());
+      EXPECT_NEAR(made / held, asked / held, synchronous ? 0.1 : 0.06) << name;
       EXPECT_LT(most - least, 0.1e-3) << name << ": it rings";
     }
   }
