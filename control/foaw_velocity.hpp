@@ -46,7 +46,7 @@ inline constexpr std::int32_t foaw_window_max = chord_window_max;
 //
 // Cost on a Cortex-M4F (GCC 12.2, -O2; executed instructions): the same for every input that holds over 16
 // intervals, less when the window ends earlier; with the count extension, the resampling and the choice of
-// the estimator 231 for the best fit, 237 for the end fit. 109 of these are the search for the window. 552
+// the estimator 231 for the best fit, 239 for the end fit. 109 of these are the search for the window. 552
 // bytes.
 template <typename Scalar>
 class FoawVelocity {

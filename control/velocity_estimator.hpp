@@ -42,7 +42,7 @@ inline constexpr double foaw_shortest_period = 0.0001;
 // A change of kind between samples gives no spike, because the new estimator does not start from nothing:
 //   - difference, foaw and foaw_end_fit give exactly what they would have given had they always been
 //     selected, unless edge_period ran before: their state is the history. Where FOAW takes every second
-//     sample it does so from the next one that it takes; until then the last output is held;
+//     sample the last output is held until the next one that it takes;
 //   - low_pass and tracking start on the previous sample with the last output as their velocity;
 //   - edge_period starts there as well, with a history laid out along that velocity, and so do foaw and
 //     foaw_end_fit after it.

@@ -301,7 +301,7 @@ int main() {
   measure_position("16-bit position, FOAW best fit         ", &position16_step, Kind::foaw, 235);
   measure_position("32-bit position, FOAW end fit          ", &position32_step, Kind::foaw_end_fit, 240);
   measure_position("32-bit position, tracking              ", &position32_step, Kind::tracking, 0);
-  measure_position("32-bit position, edge period           ", &position32_step, Kind::edge_period, 200);
+  measure_position("32-bit position, edge period           ", &position32_step, Kind::edge_period, 205);
   measure_position("32-bit position without velocity       ", &resample_step, Kind::foaw, 0);
   print("Velocity estimators alone, as docs/velocity_estimators.md compares them: mean and worst\n");
   measure_candidate<kmax::studies::HeldFoaw<1>>("alone: FOAW                            ", 0);
