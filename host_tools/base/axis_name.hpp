@@ -5,6 +5,12 @@
 
 namespace kmax::base {
 
+/// In digits alone, and none of them too many: other ways to write a number mean another one to some readers.
+constexpr bool is_plain_number(std::string_view text) {
+  const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+  return digits && (text.size() == 1 || text.front() != '0');
+}
+
 /// A name's axis and what is left of it: "axis1" and "device.mass" of "axis1.device.mass".
 struct AxisName {
   std::string_view axis;  ///< "axis" and a number without leading zeros; empty if the name begins otherwise
@@ -16,8 +22,7 @@ constexpr AxisName split_axis(std::string_view name) {
   const std::size_t dot = name.find('.');
   if (dot == std::string_view::npos || !name.starts_with(word)) return {{}, name, {}};
   const std::string_view digits = name.substr(word.size(), dot - word.size());
-  const bool number = !digits.empty() && digits.find_first_not_of("0123456789") == std::string_view::npos;
-  if (!number || (digits.size() > 1 && digits.front() == '0')) return {{}, name, {}};
+  if (!is_plain_number(digits)) return {{}, name, {}};
   return {name.substr(0, dot), name.substr(dot + 1), digits};
 }
 

@@ -50,9 +50,9 @@ std::runtime_error cannot_write(const std::string& path) {
 void make_folder(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error || !std::filesystem::is_directory(path, error))
-    throw std::runtime_error(fmt::format("{}: no folder, and none can be made: {}", path.string(),
-                                         error ? error.message() : "something else has this name"));
+  if (error)
+    throw std::runtime_error(
+        fmt::format("{}: no folder, and none can be made: {}", path.string(), error.message()));
 }
 
 void check_writable(const std::string& path) {

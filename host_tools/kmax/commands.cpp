@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "firmware/object_dictionary/dictionary.hpp"
+#include "host_tools/base/axis_name.hpp"
 
 namespace kmax::cli {
 
@@ -68,9 +69,8 @@ void add_all_commands(CLI::App& app, Context& context) {
 CLI::Validator plain_number() {
   return CLI::Validator(
       [](const std::string& text) {
-        const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
-        const bool plain = digits && (text.size() == 1 || text.front() != '0');
-        return plain ? std::string() : fmt::format("'{}' is not a plain number such as 0 or 12", text);
+        return base::is_plain_number(text) ? std::string()
+                                           : fmt::format("'{}' is not a plain number such as 0 or 12", text);
       },
       "");
 }
