@@ -283,8 +283,8 @@ RC_GTEST_PROP(VelocityEstimator, TheEdgePeriodGoesOnAlongItsVelocityOnAnotherSte
 // through changes of kind and step.
 RC_GTEST_PROP(VelocityEstimator, TheResamplersStepsChangeNothing, ()) {
   Resampler resampler;
-  VelocityEstimator<float> told;
-  VelocityEstimator<float> untold;
+  VelocityEstimator<float> with_steps;
+  VelocityEstimator<float> without_steps;
   std::int64_t count = 0;
   std::uint32_t samples = 0;
   bool started = false;
@@ -299,13 +299,13 @@ RC_GTEST_PROP(VelocityEstimator, TheResamplersStepsChangeNothing, ()) {
       count += speed + *rc::gen::inRange(-step, step + 1);
       const auto sample = resampler.sample(resample, count);
       if (!started) {
-        told.reset(sample.count);
-        untold.reset(sample.count);
+        with_steps.reset(sample.count);
+        without_steps.reset(sample.count);
         started = true;
       }
       ++samples;
-      RC_ASSERT(told.update(coefficients, sample, samples) ==
-                untold.update(coefficients, sample.count, samples));
+      RC_ASSERT(with_steps.update(coefficients, sample, samples) ==
+                without_steps.update(coefficients, sample.count, samples));
     }
   }
 }
